@@ -40,15 +40,13 @@ class RobotError(ValueError):
 def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
     """The nominal fish with `links` equal tail links, in the order of the kernels' parameter vector.
 
-    Lengths and masses: measured or published (head 150 mm, tail 100 mm, 535 g); coefficients: assumptions
-    that reproduce the published range of speeds and turning radii.
+    Published are the lengths of head (150 mm) and tail (100 mm), the total mass (535 g) and the speeds. How lengths and masses
+    are divided, and all coefficients, are assumptions; with them the fish swims at the published 0.1 to 0.5 m/s.
     """
     check_links(links)
     n = links
-    measured, assumed = (
-        "measured (weighed, ruler)",
-        "assumption; reproduces 0.1 to 0.5 m/s and 0.3 body lengths",
-    )
+    divided = "assumption, adds up to the published lengths and mass; use scales and a ruler"
+    assumed = "assumption; reproduces 0.1 to 0.5 m/s"
     strip = "slender-body strip, rho pi/4 h^2 per length, h = 0.075 m"
     rod = "1 is a uniform rod: inertia = factor (mass + added mass) length^2 / 12; a real tail's is spread unevenly"
 
@@ -58,17 +56,17 @@ def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
         return Parameter(value=value, unit=unit, lowest=lowest, highest=highest, source=source)
 
     return {
-        "head_mass": p(0.465, "kg", measured, 1e-6),
+        "head_mass": p(0.465, "kg", divided, 1e-6),
         "head_added_mass_surge": p(0.05, "kg", assumed),
         "head_added_mass_sway": p(0.55, "kg", assumed),
         "head_inertia": p(2.4e-3, "kg m^2", assumed + "; includes the added inertia", 1e-9),
-        "hinge_offset": p(0.075, "m", measured),
-        "link_length": p(0.07 / n, "m", measured, 1e-6),
-        "link_mass": p(0.05 / n, "kg", measured, 1e-9),
+        "hinge_offset": p(0.075, "m", divided),
+        "link_length": p(0.07 / n, "m", divided, 1e-6),
+        "link_mass": p(0.05 / n, "kg", divided, 1e-9),
         "link_added_mass_sway": p(STRIP_ADDED_MASS * 0.07 / n, "kg", strip),
         "link_inertia_factor": p(1.0, "1", rod),
-        "fin_length": p(0.03, "m", measured, 1e-6),
-        "fin_mass": p(0.02, "kg", measured, 1e-9),
+        "fin_length": p(0.03, "m", divided, 1e-6),
+        "fin_mass": p(0.02, "kg", divided, 1e-9),
         "fin_added_mass_sway": p(STRIP_ADDED_MASS * 0.03, "kg", strip),
         "fin_inertia_factor": p(1.0, "1", rod),
         "tail_stiffness": p(0.10 * n / 3, "N m/rad", assumed),
@@ -81,7 +79,7 @@ def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
         "fin_drag_surge": p(0.03, "N s/m", assumed),
         "fin_drag_sway": p(0.4, "N s/m", assumed),
         "servo_rate_limit": p(6.0, "rad/s", "assumption; hobby servo under load", 1e-3),
-        "rudder_range": p(0.8, "rad", "measured", 1e-3, math.pi / 2),
+        "rudder_range": p(0.8, "rad", "assumption; use a protractor", 1e-3, math.pi / 2),
     }
 
 
@@ -187,12 +185,12 @@ def _check_table(
         if name not in specification:
             raise RobotError(f"{where}.{name}: unknown name; known: {', '.join(specification)}")
     return {
-        name: _check_value(f"{where}.{name}", parameter, given.get(name, parameter.value))
+        name: check_value(f"{where}.{name}", parameter, given.get(name, parameter.value))
         for name, parameter in specification.items()
     }
 
 
-def _check_value(where: str, parameter: Parameter, value: Any) -> float:
+def check_value(where: str, parameter: Parameter, value: Any) -> float:
     expected = f"a number in [{parameter.lowest:g}, {parameter.highest:g}] {parameter.unit}"
     if isinstance(value, str):
         expected += " (YAML reads 1e-3 as text: write 1.0e-3)"

@@ -7,7 +7,8 @@ Every value in a file is checked; an error names file, field, value and what was
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,11 @@ import yaml
 from fish_report.files import read_yaml
 from fish_sim.effects import EFFECTS
 from fish_sim.parameter import Parameter
-from fish_sim.robot import Robot, RobotError, check_links, nominal_parameters
+from fish_sim.robot import Robot, RobotError, check_links, check_value, nominal_parameters
 from fish_sim.sensors import SENSOR_EFFECTS
 
 FORMAT = 1
-
+FIELDS = ("value", "unit", "std", "source")  # of a value; a parameter has `knowledge` as well
 
 STATES = ("filter", "shooting")  # ways to the state that a prediction starts from
 
@@ -51,7 +52,10 @@ def _from_content(content: Any) -> Robot:
     return Robot(
         links=links,
         parameters=_values(
-            "parameters", content.get("parameters") or {}, nominal_parameters(links)
+            "parameters",
+            content.get("parameters") or {},
+            nominal_parameters(links),
+            (*FIELDS, "knowledge"),
         ),
         effects=_effect_values("effects", content.get("effects") or {}, EFFECTS),
         sensors=_effect_values("sensors", content.get("sensors") or {}, SENSOR_EFFECTS),
@@ -88,38 +92,61 @@ def _effect_values(where: str, given: Any, table: Mapping[str, Any]) -> dict[str
     """Parameter values of every effect in a file; unknown names are left to Robot to refuse."""
     if not isinstance(given, dict):
         raise RobotError(f"{where}: got {given!r}; expected a table of effect: parameters")
-    return {
-        name: _values(
-            f"{where}.{name}", values or {}, table[name].parameters if name in table else None
-        )
-        for name, values in given.items()
-    }
+    found = {}
+    for name, values in given.items():
+        known = table[name].parameters if name in table else {}
+        if known and (values is None or values == {}):
+            raise RobotError(
+                f"{where}.{name}: got no parameter; expected at least one of {', '.join(known)}; "
+                f"give one, or leave {name} out"
+            )
+        found[name] = _values(f"{where}.{name}", {} if values is None else values, known)
+    return found
 
 
-def _values(where: str, table: Any, units: Mapping[str, Parameter] | None = None) -> dict[str, Any]:
-    """Entries are plain numbers or {value, unit, std, source}; a unit, where given, must be the model's."""
+def _values(
+    where: str, table: Any, units: Mapping[str, Parameter], fields: Sequence[str] = FIELDS
+) -> dict[str, Any]:
+    """Entries are plain numbers or tables of `fields`; a unit, where given, must be the model's."""
     if not isinstance(table, dict):
         raise RobotError(f"{where}: got {table!r}; expected a table of name: value")
     result = {}
     for name, entry in table.items():
         if isinstance(entry, dict):
+            if unknown := sorted(map(str, set(entry) - set(fields))):
+                raise RobotError(
+                    f"{where}.{name}.{unknown[0]}: unknown field; known: {', '.join(fields)}"
+                )
             if "value" not in entry:
                 raise RobotError(
                     f"{where}.{name}: got {entry!r}; expected a number or a table with 'value'"
                 )
-            if units and name in units and entry.get("unit", units[name].unit) != units[name].unit:
+            if name in units and entry.get("unit", units[name].unit) != units[name].unit:
                 raise RobotError(
                     f"{where}.{name}.unit: got {entry['unit']!r}; expected {units[name].unit!r}"
+                )
+            if not _unknown(entry.get("std")):
+                unit = units[name].unit if name in units else ""
+                check_value(
+                    f"{where}.{name}.std", Parameter(0.0, unit, 0.0, math.inf), entry["std"]
                 )
             entry = entry["value"]
         result[name] = entry
     return result
 
 
+def _unknown(std: Any) -> bool:
+    """Whether nothing is known of a standard error, as in a file that states none."""
+    return std is None or (isinstance(std, float) and not math.isfinite(std) and std != -math.inf)
+
+
 def save_robot(
     robot: Robot, path: str | Path, std: Mapping[str, float] | None = None, notes: str = ""
 ) -> None:
-    """Write robot.yaml with units and sources; `std` maps `name` or `effect.name` to a standard error."""
+    """Write robot.yaml with units and sources; `std` maps `name` or `effect.name` to a standard error.
+
+    One that is not finite is left out: nothing is known of it.
+    """
     std = std or {}
 
     def rows(
@@ -129,7 +156,7 @@ def save_robot(
         for name, value in values.items():
             parameter = specification[name]
             row: dict[str, Any] = {"value": float(value), "unit": parameter.unit}
-            if prefix + name in std:
+            if math.isfinite(std.get(prefix + name, math.nan)):
                 row["std"] = float(std[prefix + name])
             if not prefix and name in robot.knowledge:
                 row["knowledge"] = robot.knowledge[name]

@@ -414,6 +414,14 @@ def test_a_file_gives_back_the_robot_with_effects_and_sensors(tmp_path):
     assert all(row["unit"] and row["source"] for row in content["parameters"].values())
 
 
+def test_an_unknown_standard_error_is_left_out_of_the_file(tmp_path):
+    unknown = {"head_mass": math.nan, "link_mass": math.inf, "head_drag_yaw": 1e-4}
+    save_robot(Robot(), tmp_path / "model.yaml", std=unknown)
+    assert load_robot(tmp_path / "model.yaml") == Robot()
+    content = yaml.safe_load((tmp_path / "model.yaml").read_text())
+    assert [n for n, row in content["parameters"].items() if "std" in row] == ["head_drag_yaw"]
+
+
 def test_digest_tells_robots_apart_by_motion_and_not_by_name():
     robot = Robot()
     assert Robot(name="other").digest() == robot.digest()
@@ -498,6 +506,34 @@ def test_impossible_robots_are_refused_with_name_and_value(make, words):
             "format: 1\nparameters: {head_mass: {value: 465, unit: g}}",
             ["head_mass.unit", "'g'", "'kg'"],
         ),
+        (
+            "format: 1\nparameters: {head_mass: {value: 465, units: g}}",
+            ["parameters.head_mass.units: unknown field; known: value, unit, std, source"],
+        ),
+        ("format: 1\nparameters: {head_mass: {value: 1, 7: 2}}", ["parameters.head_mass.7"]),
+        *(
+            (
+                f"format: 1\nparameters: {{head_mass: {{value: 0.5, std: {std}}}}}",
+                ["parameters.head_mass.std: got", "expected a number in [0, inf] kg"],
+            )
+            for std in ("-.inf", "-0.1", "true", "1e-3", f"1{'0' * 400}")
+        ),
+        (
+            "format: 1\neffects: {tip_slip: {mobility: {value: 1, knowledge: measured}}}",
+            ["effects.tip_slip.mobility.knowledge: unknown field; known: value, unit, std, source"],
+        ),
+        *(
+            (
+                f"format: 1\neffects: {{quadratic_drag: {nothing}}}",
+                ["effects.quadratic_drag: got no parameter; expected at least one of surge, "],
+            )
+            for nothing in ("", "{}", "null")
+        ),
+        (
+            "format: 1\nsensors: {camera_latency: }",
+            ["sensors.camera_latency: got no parameter; expected at least one of delay"],
+        ),
+        ("format: 1\neffects: {quadratic_drag: []}", ["effects.quadratic_drag: got []"]),
         ("format: 1\neffects: [current]", ["effects", "current", "table"]),
         ("format: 1\neffects: {darg: {}}", ["darg", "known"]),
         (
@@ -532,3 +568,10 @@ def test_shipped_robot_file_is_the_nominal_robot():
     shipped = load_robot(Path(__file__).parent.parent / "config" / "robot.yaml")
     assert shipped == Robot(name="nominal fish")
     assert list(shipped.parameters) == list(nominal_parameters())
+
+
+@pytest.mark.parametrize("std", [".nan", ".inf", "null"])
+def test_a_standard_error_that_nobody_knows_is_none(tmp_path, std):
+    file = tmp_path / "robot.yaml"
+    file.write_text(f"format: 1\nparameters: {{head_mass: {{value: 0.5, std: {std}}}}}")
+    assert load_robot(file).parameters["head_mass"] == 0.5
