@@ -25,11 +25,12 @@ from fish_sysid.dataset.camera import (
     moved_back,
     with_marker,
 )
-from fish_sysid.dataset.experiment import FEWEST_POSES, Experiment
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.grid import FEWEST_POSES
 from fish_sysid.dataset.imu import imu_moved_back
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.noise_estimation import initial_noise, usual_noise
+from fish_sysid.estimation.map_fit import Fit, evaluate, initial_noise
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization, nominal_hypothesis
 from fish_sysid.estimation.refit import ANNEAL_HELD, refit, refit_if_suspect
 from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
@@ -106,16 +107,18 @@ def identify(
     effects: names added to the robot's, their parameters free. choose_from: where the model is wrong beyond its noise, those
     of these effects are added that let it predict training trials better when they are left out in turn. links: numbers of
     links of the tail that a robot fitted to predictions may have.
-    A delay of the camera that the gyro shows is taken out of all trials first, so that horizons count from the moment an
-    image was taken, and goes into the robot that comes back; so does the place of the camera's point that the robot has.
+    A delay of the camera that the robot states, or else the gyro shows, is taken out of all trials first, so that horizons
+    count from the moment an image was taken, and goes into the robot that comes back; so does the place of the camera's point.
     """
     began, ahead = time.monotonic(), ahead_of(robot)
     experiment, robot = at_centre_of_mass(experiment, ahead), with_marker(robot, -ahead)
     train, held = split(len(experiment.names), hold_out)
     lag, unknown = Alignment(0.0, np.nan, np.nan), False
-    if "camera_latency" not in (*robot.sensors, *effects):
-        lag = align(experiment.select(train))
-        unknown = bool(np.isnan(lag.rms))
+    stated = robot.sensors.get("camera_latency")
+    if not any(name.startswith("camera_latency") for name in (*effects, *free)):
+        lag = replace(lag, delay=stated["delay"]) if stated else align(experiment.select(train))
+        unknown = not stated and bool(np.isnan(lag.rms))
+        robot = robot.without_effect("camera_latency")
     experiment, unseen = with_poses_left(experiment, lag.delay)
     train, held = split(len(experiment.names), hold_out)
     moved = moved_back(experiment, lag.delay)
@@ -124,10 +127,12 @@ def identify(
     noise = noise or usual_noise(training)
     report("can the model follow the fish?")
     why, fitted = CANNOT_FOLLOW, None
-    if misfit(training, robot, noise, free) <= TOO_FAR:
+    follows = misfit(training, robot, noise, free) <= TOO_FAR
+    predictable = can_be_predicted(training)
+    if follows or not predictable:
         fit, wrong = by_likelihood(training, robot, noise, free, effects, report)
         why, said = FITTED_FOR_OUTLOOK, (NOT_CHOSEN,) if choose_from else ()
-        if wrong and not can_be_predicted(training):
+        if not predictable and (wrong or not follows):
             wrong, said = False, (TOO_SHORT,)
         fitted = None if wrong else Fitted(fit, moved, lag.delay, 0.0, said)
     if fitted is None:

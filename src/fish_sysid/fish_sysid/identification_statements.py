@@ -10,7 +10,7 @@ from fish_sim.model import DT
 from fish_sysid.dataset.camera import Alignment
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.parametrization import Parametrization, zeros
+from fish_sysid.estimation.parametrization import Parametrization, left_at_zero
 from fish_sysid.estimation.shooting.left_out import Step, step_text
 from fish_sysid.estimation.shooting.prediction_fit import IMU_CLOCK, PLACE, PredictionFit
 from fish_sysid.estimation.shooting.rollout import ShotParametrization
@@ -32,7 +32,9 @@ AGE_UNKNOWN = (
     "the age of the images is not known: no trial has 5 s of gyro without a pause and of images with it; where images are late, "
     "no fit can be trusted before it is: record the IMU"
 )
-NO_ENCODER = "the rotor is taken to follow its commands"
+NO_ENCODER = (
+    "the rotor is taken to follow its commands, or its measured speed where that drives the model"
+)
 
 
 def step_statement(step: Step) -> str:
@@ -72,6 +74,10 @@ def lag_statements(lag: Alignment) -> list[str]:
     """What camera and gyro say about each other's stamps."""
     if not lag.delay:
         return []
+    if np.isnan(lag.rms):
+        return [
+            f"images are {lag.delay:.2f} s older than their stamps, as the robot states; taken out of all trials"
+        ]
     return [
         f"images are {lag.delay:.2f} s older than their stamps: heading of camera and gyro then differ by {lag.rms:.3f} rad "
         f"instead of {lag.rms_undelayed:.3f} (rms in 4 s); taken out of all trials, camera_latency in robot.yaml"
@@ -109,7 +115,7 @@ def data_statements(experiment: Experiment, held_out: Experiment | None) -> list
         )
     for what, rows, cost in (
         ("IMU", experiment.gyro, NO_IMU),
-        ("encoder", experiment.encoder, NO_ENCODER),
+        ("encoder sample to compare", experiment.encoder, NO_ENCODER),
     ):
         missing = [
             name for m, name in enumerate(experiment.names) if not np.isfinite(rows[:, m]).any()
@@ -176,7 +182,7 @@ def fit_statements(fit: Fit, predicted: PredictionFit | None = None) -> list[str
         out.append(
             f"the data do not determine {', '.join(names)}: values and errors rest on the prior"
         )
-    if names := zeros(fit.robot):
+    if names := left_at_zero(fit.robot):
         out.append(
             f"{', '.join(names)}: 0 in the robot that the fit began with, so 0 in the one that came out"
         )

@@ -17,6 +17,7 @@ from fish_sysid.dataset.camera import fine_delay
 from fish_sysid.dataset.experiment import Experiment, Frames, joined
 from fish_sysid.dataset.synthetic import INJECTIONS, with_injection
 from fish_sysid.diagnosis.change import comparable
+from fish_sysid.diagnosis.change.candidates import COLUMNS
 from fish_sysid.diagnosis.change.change import Change, Member, Named
 from fish_sysid.diagnosis.change.change_json import (
     answer,
@@ -138,6 +139,23 @@ def test_exchanged_sets_share_no_more_trials_with_new_than_random_ones() -> None
     assert 280 < len(found) <= 294
 
 
+@pytest.mark.parametrize("with_gyro", [True, False])
+def test_older_images_show_an_older_yaw_rate_where_no_gyro_tells_it(days, with_gyro) -> None:
+    _, new = days
+    seen = new if with_gyro else replace(new, gyro=np.full_like(new.gyro, np.nan))
+    aged = with_injection(seen, "camera_latency", {"delay": 0.05})  # the typical one
+    changes, columns = [], []
+    for before, after in zip(swims(seen), swims(aged), strict=True):
+        rate = before.channel == 2
+        changes.append((after.measured() - before.measured())[rate])
+        columns.append(COLUMNS["camera_latency"](before)[rate, 0])
+    change, column = np.concatenate(changes), np.concatenate(columns)
+    if with_gyro:
+        assert not column.any()
+    else:
+        assert change @ column / (column @ column) == pytest.approx(1.0, abs=0.1)
+
+
 def test_a_rudder_injection_leaves_the_motion_and_changes_the_log(days) -> None:
     old, _ = days
     rudder = old.commands[..., 1]
@@ -250,6 +268,23 @@ def test_without_a_change_of_the_images_age_the_regression_looks_for_one(days) -
     assert age_change(old, blind) is None
 
 
+def test_images_whose_age_differs_as_much_from_day_to_day_are_no_change(days) -> None:
+    """Images of OLD's first day are 0.1 s old and those of its second 0.5 s, those of NEW 0.7 s."""
+    old, new = days
+    first, second, aged = (
+        with_injection(e, "camera_latency", {"delay": age})
+        for e, age in ((old.select(range(5)), 0.1), (old.select(range(5, OLD)), 0.5), (new, 0.7))
+    )
+    both = joined([first, second])
+    one_day, two_days = (
+        age_change(both, aged, day_of) for day_of in ((), [0] * 5 + [1] * 5 + [2] * NEW)
+    )
+    assert one_day is not None
+    assert two_days is not None
+    assert one_day.p_value <= 0.01
+    assert two_days.p_value == 0.5
+
+
 def test_kinds_leave_enough_exchanges(days) -> None:
     old, new = days
     few = swims(old)[:6], swims(new)[:3]
@@ -345,6 +380,18 @@ def test_the_trial_goes_on_where_it_diverged(driven) -> None:
     again = JUMP + round((AFTER + 1.0) / DT)
     assert x[again:-1, 1, turn].mean() == pytest.approx(x[again:-1, 0, turn].mean(), rel=0.1)
     assert lost[JUMP - round(BEFORE / DT) + 10 : JUMP + round(AFTER / DT), 1].all()
+
+
+def test_what_diverges_after_every_restart_says_nothing(driven) -> None:
+    _, _, turn = driven
+    stepper = filter_stepper(Robot())
+    commands = np.zeros((900, 1, 2))
+    for k in range(100, 880, 60):  # thirteen jumps of the rotor
+        commands[k : k + 6, 0, 0] = (4e4, -4e4, 4e4, -4e4, 4e4, -4e4)
+    x, lost = rollout(stepper, stepper.parameters(Robot())[None], commands)
+    gone = ~np.isfinite(x[:-1, 0, turn])
+    assert gone.any()
+    assert lost[int(gone.argmax()) - 100 : -1, 0].all()
 
 
 def test_its_neighbour_is_as_without_it(driven) -> None:
@@ -498,6 +545,22 @@ def test_an_injection_is_named_with_its_number(stepped_days, name, values, toler
     assert found.value == pytest.approx(value, abs=tolerance)
 
 
+def test_a_servo_that_differs_as_much_from_day_to_day_is_no_change(stepped_days) -> None:
+    """OLD's first day has a gain of 0.6 and its second of 1.0, NEW has 1.2."""
+    old, new = stepped_days
+    first = with_injection(old.select(range(4)), "rudder_gain", {"factor": 0.6})
+    both = joined([first, old.select(range(4, STEPPED_OLD))])
+    stronger = with_injection(new, "rudder_gain", {"factor": 1.2})
+    one_day, two_days = (
+        step_response(both, stronger, STRATA, 60, days=days)
+        for days in ((), [0] * 4 + [1] * 4 + [2] * STEPPED_NEW)
+    )
+    assert one_day is not None
+    assert two_days is not None
+    assert one_day.p_value < LEVEL
+    assert two_days.p_value == 0.5
+
+
 def test_a_lag_is_told_from_a_delay(stepped_days) -> None:
     """The command is what a servo with a lag of 0.12 s would have had to get."""
     old, new = stepped_days
@@ -532,25 +595,60 @@ def test_without_a_gyro_there_is_no_answer(stepped_days) -> None:
     assert step_response(old, replace(new, gyro=np.full_like(new.gyro, np.nan)), STRATA) is None
 
 
+@pytest.mark.parametrize("phase", [0, 1])
+def test_a_gyro_of_every_other_grid_point_answers_on_odd_ones_too(stepped_days, phase) -> None:
+    """A full one is read at even ones: the answer is the same there, and about the same between them."""
+    old, new = stepped_days
+    late = with_injection(new, "rudder_delay", {"delay": 0.085})
+    full = step_response(old, late, STRATA, 20)
+    slow = [replace(e, gyro=e.gyro.copy()) for e in (old, late)]
+    for e in slow:
+        e.gyro[1 - phase :: 2] = np.nan
+    answer = step_response(*slow, STRATA, 20)
+    assert answer is not None
+    assert full is not None
+    assert answer.servos[0].name == "rudder_delay"
+    assert answer.servos[0].gains == pytest.approx(full.servos[0].gains, rel=0.1 * phase)
+    assert answer.servos[0].estimate.value == pytest.approx(0.085, abs=0.01)
+
+
+def test_a_trial_without_a_gyro_is_left_out_while_enough_remain(stepped_days) -> None:
+    old, new = stepped_days
+    late = with_injection(new, "rudder_delay", {"delay": 0.085})
+    silent = [replace(e, gyro=e.gyro.copy()) for e in (old, late)]
+    for e in silent:
+        e.gyro[:, 0] = np.nan
+    answer = step_response(*silent, STRATA, 150)
+    rest = [e.select(range(1, len(e.names))) for e in (old, late)]
+    expected = step_response(*rest, STRATA[2:], 150)
+    assert answer is not None
+    assert expected is not None
+    assert answer.p_value == expected.p_value < LEVEL
+    assert answer.servos[0].estimate == expected.servos[0].estimate
+    silent[1].gyro[:, :3] = np.nan
+    assert step_response(*silent, STRATA, 150) is None
+
+
 def test_the_gyro_has_a_second_opinion_on_timing_alone() -> None:
     """The mean motion says placement, the gyro lag. The gyro says nothing of a flow."""
     by_motion = _named("rudder_placement", rudder_placement=0.7, rudder_delay=0.3)
     flow = _named("current", current=1.0)
-    by_gyro = RudderChange(0.03, _named("rudder_lag", rudder_lag=0.9, rudder_delay=0.1))
+    by_gyro = RudderChange(0.03, _named("rudder_lag", 2.0, rudder_lag=0.9, rudder_delay=0.1))
     timing, same = with_second_opinion([by_motion, flow], by_gyro)
     assert {m.name: m.probability for m in timing.members} == pytest.approx(
         {"rudder_lag": 0.45, "rudder_placement": 0.35, "rudder_delay": 0.2}
     )
     assert timing.name == "rudder_lag"
+    assert (timing.family, timing.gain) == ("rudder timing", 2.0)
     assert same is flow
     unsure = RudderChange(0.3, by_gyro.named)
     assert with_second_opinion([by_motion], unsure) == [by_motion]
 
 
-def _named(first: str, **members: float) -> Named:
-    none = Refitted({}, "", np.zeros(3))
+def _named(first: str, gain: float = 1.0, **members: float) -> Named:
+    none = Refitted({}, "", np.full(3, gain))
     made = tuple(Member(name, p, 0.5, none) for name, p in members.items())
-    return Named(made, family_of(first), 1.0, 0.1)
+    return Named(made, family_of(first), gain, 0.1)
 
 
 def test_a_number_at_an_end_of_those_tried_is_not_said_to_be_exact() -> None:

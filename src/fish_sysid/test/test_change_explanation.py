@@ -11,28 +11,37 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import sem
 from swims import World, fish, kinematic_swims, swim
 
 from fish_sim.robot import Robot
+from fish_sysid.dataset.camera import fine_delay
+from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.synthetic import with_injection
 from fish_sysid.diagnosis.change.change import Change, Member, Named
 from fish_sysid.diagnosis.change.change_json import answer
 from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.compare import LOOKS
-from fish_sysid.diagnosis.change.contenders import Case, Contender, family_alone, weighed
+from fish_sysid.diagnosis.change.contenders import (
+    Case,
+    Contender,
+    family_alone,
+    next_change,
+    weighed,
+)
 from fish_sysid.diagnosis.change.explanation import exact_age, explained, swapped_in, telling
-from fish_sysid.diagnosis.change.naming import Judged
+from fish_sysid.diagnosis.change.naming import Judged, apart, judge_all, tie
 from fish_sysid.diagnosis.change.permutation_test import (
     largest,
     permutation_p_value,
     rank,
     sets_in_place,
 )
-from fish_sysid.diagnosis.change.rows import look, trial_rows
+from fish_sysid.diagnosis.change.rows import MEAN_MOTION, look, trial_rows
 from fish_sysid.diagnosis.change.servos import OldAnswer
 from fish_sysid.diagnosis.change.shared_fit import regression
 from fish_sysid.diagnosis.change.strength import Refitted, refit
-from fish_sysid.diagnosis.change.swap_test import Swapped, at_once
+from fish_sysid.diagnosis.change.swap_test import Swapped, at_once, swap_test
 from fish_sysid.diagnosis.degenerate import degenerate
 from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.reports.change_page import side_by_side, write_change_page
@@ -117,6 +126,17 @@ def test_names_are_compared_by_what_they_gain_before_their_dispersion_is_divided
     assert set(names(weighed([calm, lively])[0])) == {"hull_asymmetry", "camera_heading_offset"}
     lively = replace(lively, judged=replace(lively.judged, dispersion=1.0))
     assert names(weighed([calm, lively])[0]) == ["hull_asymmetry"]
+
+
+@pytest.mark.parametrize(("trials", "asked"), [(3, 4.527), (9, 2.366), (1000, 2.003)])
+def test_few_trials_ask_for_a_larger_lead(trials, asked) -> None:
+    """A lead in standard errors that are estimated from the trials: Student's t at the level of two normal ones."""
+    even, spread = np.zeros(trials), np.linspace(-1.0, 1.0, trials)
+    ahead = spread / sem(spread)
+    assert not apart(ahead + 0.99 * asked, even)
+    assert apart(ahead + 1.01 * asked, even)
+    assert tie(ahead + asked, even) == pytest.approx(0.0455, rel=0.01)
+    assert tie(even, even) == 1.0
 
 
 def test_what_explains_as_much_and_cannot_be_makes_the_best_name_unsure() -> None:
@@ -231,6 +251,47 @@ def test_the_age_of_images_is_that_of_new_less_that_of_old(days) -> None:
     assert said.members[0].refitted.parameters["delay"].value == age
     unknown = replace(old, gyro=np.full_like(old.gyro, np.nan))
     assert exact_age(unknown, new, named) == (0.11, named)
+    early = replace(old, gyro=np.roll(old.gyro, 15, axis=0))  # 0.125 s behind its images
+    assert exact_age(early, new, named) == (0.11, named)
+    assert exact_age(old, early, named) == (0.11, named)
+
+
+@pytest.mark.parametrize("age", [-0.1, -0.01, 0.0, 0.004, 0.995, 1.05])
+def test_an_age_beyond_those_tried_is_not_known(days, age) -> None:
+    """An image is older the earlier the gyro's samples come; 0 to 1 s are tried."""
+    _, new = days
+    late = with_injection(new, "camera_latency", {"delay": age + 0.1})
+    found, std = fine_delay(replace(late, gyro=np.roll(late.gyro, 10, axis=0)))
+    if 0.0 <= age <= 1.0:
+        assert found == pytest.approx(age, abs=0.003)
+        assert std < 0.003
+    else:
+        assert np.isnan(found)
+
+
+def test_what_old_s_days_differ_by_is_no_remainder_of_a_name() -> None:
+    """A marker that sits otherwise on OLD's first day differs more from the rest than it does on NEW, where a flow comes too."""
+
+    def turned(experiment: Experiment, offset: float) -> Experiment:
+        return with_injection(experiment, "camera_heading_offset", {"offset": offset})
+
+    yesterday, today = kinematic_swims(World(), 1, 8, 10.0), kinematic_swims(World(), 2, 4, 10.0)
+    new = with_injection(turned(today, 0.06), "current", {"x": 0.05, "y": 0.0})
+    names = ("current", "camera_heading_offset")
+    first, second, rows = (
+        look(trial_rows(Robot(), e, swims(e), names), MEAN_MOTION)
+        for e in (turned(yesterday.select(range(4)), -0.12), yesterday.select(range(4, 8)), new)
+    )
+    old, day_of = [*first, *second], [0] * 4 + [1] * 4 + [2] * 4
+    fit, strata = regression(old, rows), [0] * 12
+    case = Case(
+        MEAN_MOTION, fit, old, rows, strata, day_of, Robot(), new, tuple(swims(new)), OldAnswer.of(old)
+    )  # fmt: skip
+    seen = swap_test(fit, strata, 100, days=day_of)
+    found = next_change(case, seen, judge_all(fit), (), [])
+    assert found is not None
+    assert [m.name for m in found[0].members] == ["current"]
+    assert found[0].members[0].remainder_p_value == 0.5
 
 
 def test_so_little_of_an_effect_is_not_said(days, looks_at) -> None:

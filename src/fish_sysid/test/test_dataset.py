@@ -32,7 +32,7 @@ from fish_sysid.dataset.commands import (
     standing,
 )
 from fish_sysid.dataset.experiment import Experiment, Frames, Headings
-from fish_sysid.dataset.grid import apart, level, on_grid, starts_at_rest
+from fish_sysid.dataset.grid import apart, in_holes, level, on_grid, starts_at_rest
 from fish_sysid.dataset.imu import WINDOW, imu_moved_back, orientation_windows
 from fish_sysid.dataset.synthetic import FULL_SPEED, KINDS, STROKE, program, record, with_gyro_scale
 from fish_sysid.diagnosis.task import make_task
@@ -131,9 +131,28 @@ def test_encoder_replaces_a_command_that_stands_while_the_rotor_runs_down() -> N
     speed, left = driven(command, encoder)
     assert standing(command) == [(200, 400)]
     np.testing.assert_array_equal(speed[:200], command[:200])
-    np.testing.assert_allclose(speed[200:398], 40.0 * np.exp(-(t[200:398] - 2.0)), atol=0.01)
-    assert np.isnan(left[200:]).all()
-    assert np.isfinite(left[:200]).any()
+    np.testing.assert_allclose(speed[200:397], 40.0 * np.exp(-(t[201:398] - 2.0)), atol=0.01)
+    assert np.isnan(left[201:]).all()
+    assert np.isfinite(left[:201]).any()
+
+
+def test_a_rotor_that_the_encoder_drives_moves_as_the_encoder_measured() -> None:
+    """At every grid point, also at the first and the last of two forgotten commands."""
+    random, k = np.random.default_rng(5), np.arange(300)
+    given = 50.0 * np.sin(0.12 * k)
+    given[80:150], given[200:] = 30.0, 40.0
+    followed = np.where((k >= 80) & (k < 150), 30.0 * np.exp(-0.02 * (k - 80)), given)
+    followed[200:] = 40.0 * np.exp(-0.01 * (k[200:] - 200))
+
+    def rotor(command: np.ndarray) -> np.ndarray:
+        """(T,) speed of the model's rotor."""
+        told = np.stack([command, 0.0 * command], axis=-1)[:, None]
+        return record(Robot(), told, Noise(encoder=0.0), random)[0].encoder[:, 0]
+
+    encoder = rotor(followed)
+    speed, left = driven(given, encoder)
+    np.testing.assert_allclose(rotor(speed), encoder, atol=1e-9)
+    assert np.flatnonzero(np.isnan(left)).tolist() == [*range(81, 151), *range(201, 300)]
 
 
 @pytest.mark.parametrize(("apart", "replaced"), [(4.0, False), (6.0, True), (-6.0, True)])
@@ -143,7 +162,7 @@ def test_a_constant_command_stays_as_long_as_the_rotor_follows_it(
     command = np.full(200, 40.0)
     speed, left = driven(command, command + apart)
     np.testing.assert_array_equal(speed, command + apart if replaced else command)
-    assert np.isfinite(left).any() != replaced
+    assert np.isfinite(left[1:]).any() != replaced
 
 
 def test_a_rotor_that_is_told_to_stand_runs_down_in_the_model() -> None:
@@ -239,6 +258,18 @@ def test_a_hole_at_either_end_has_fewer_commands_to_run_through() -> None:
         assert np.abs(given[:, 0] - TOLD[:, 0]).max() < 2.0
 
 
+@pytest.mark.parametrize("late", [0.004, 0.006, 0.009, 0.0099, 0.01])
+@pytest.mark.parametrize("which", [PEAK - 3, PEAK - 1])
+def test_a_late_command_beside_a_hole_throws_the_rotor_not_far_off(late: float, which: int) -> None:
+    """A line through the hole cuts the top of a stroke by 2 rad/s; a command 10 ms late has the stamp of the next one."""
+    kept = without(PEAK - 1, 3)
+    t = GRID[kept]
+    t[which] += late
+    given, _ = commands_on_grid(t, TOLD[kept], GRID, SILENT)
+    hole = slice(PEAK - 1, PEAK + 2)
+    assert np.abs(given[hole, 0] - TOLD[hole, 0]).max() < 2.5
+
+
 def test_a_hole_that_is_too_long_is_said() -> None:
     commands_on_grid(GRID[(kept := without(200, 9))], TOLD[kept], GRID, SILENT)
     kept = without(200, 10)
@@ -267,6 +298,51 @@ def random_stamps(spread: float) -> np.ndarray:
 )
 def test_commands_that_do_not_come_on_a_beat_are_held(t: np.ndarray) -> None:
     assert holes(t) == []
+
+
+def late_commands() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(stamps, commands, encoder): each command reaches the rotor up to 30 ms after its stamp."""
+    rng = np.random.default_rng(2)
+    t = np.unique(np.round(GRID + 0.03 * rng.random(len(GRID)), 2))
+    arrived = np.searchsorted(t + 0.03 * rng.random(len(t)), GRID, side="right") - 1
+    given = TOLD[np.searchsorted(GRID, t).clip(0, len(GRID) - 1)]
+    followed = given[np.maximum(arrived, 0), 0]
+    return t, given, np.append(0.0, followed[:-1]) + 0.2 * rng.standard_normal(len(GRID))
+
+
+def test_the_encoder_drives_a_rotor_that_irregular_commands_do_not_explain() -> None:
+    t, given, encoder = late_commands()
+    commands, left = commands_on_grid(t, given, GRID, encoder)
+    np.testing.assert_allclose(commands[:-1, 0], encoder[1:])
+    assert np.isnan(left).all()
+    _, kept = commands_on_grid(t, given, GRID, SILENT)
+    np.testing.assert_array_equal(kept, SILENT)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, 60.0 / (2.0 * np.pi)])  # dead, turned, in 1/min
+def test_an_encoder_that_shows_another_motion_drives_nothing(factor: float) -> None:
+    t, given, encoder = late_commands()
+    _, left = commands_on_grid(t, given, GRID, factor * encoder)
+    np.testing.assert_array_equal(left, factor * encoder)
+
+
+def test_irregular_commands_that_the_rotor_follows_are_held() -> None:
+    t, given, _ = late_commands()
+    held = given[np.clip(np.searchsorted(t, GRID + 0.5 * DT, side="right") - 1, 0, None), 0]
+    encoder = np.append(0.0, held[:-1])
+    commands, left = commands_on_grid(t, given, GRID, encoder)
+    np.testing.assert_array_equal(commands[:, 0], held)
+    np.testing.assert_array_equal(left, encoder)
+
+
+def test_a_long_hole_in_which_everything_stands_is_none() -> None:
+    t, still = GRID[without(200, 30)], np.zeros((len(GRID) - 30, 2))
+    noise = 0.2 * np.random.default_rng(3).standard_normal(len(GRID))
+    commands, _ = commands_on_grid(t, still, GRID, noise)
+    assert not commands.any()
+    for unlike in (SILENT, TOLD[:, 0]):  # nobody knows, or it swam
+        with pytest.raises(LostCommandsError):
+            commands_on_grid(t, still, GRID, unlike)
 
 
 def test_the_beat_may_be_another_than_the_grids_and_many_may_be_lost() -> None:
@@ -508,6 +584,16 @@ def test_a_servo_keeps_its_last_command_when_the_controller_has_ended() -> None:
     assert held_rudder(rotor, rudder) == pytest.approx(np.full(500, -0.3))
 
 
+def test_a_servo_keeps_it_also_where_the_encoder_drives_the_rotor() -> None:
+    t, given, encoder = late_commands()
+    given = np.where(t[:, None] < 3.3, np.column_stack([given[:, 0], 0.0 * t - 0.3]), [40.0, 0.0])
+    ended = np.flatnonzero(GRID >= 3.3)
+    encoder[ended] = 40.0 + 0.2 * np.cos(GRID[ended])
+    found, left = commands_on_grid(t, given, GRID, encoder)
+    assert np.isnan(left).all()
+    np.testing.assert_array_equal(found[:, 1], -0.3)
+
+
 def test_a_rudder_that_is_told_to_centre_is_centred() -> None:
     rotor, rudder = commands()
     swimming = 60.0 * np.sin(0.1 * np.arange(500))
@@ -545,3 +631,10 @@ def test_what_a_trial_lacks_is_said_of_that_trial() -> None:
     assert any(t.startswith("synthetic_01: no IMU from 0.0 to 1.3 s") for t in texts)
     assert any(t.startswith("synthetic_00: turns by") for t in texts)
     assert not any(t.startswith("synthetic_00: no") for t in texts)
+
+
+def test_grid_points_far_from_known_ones_lie_in_holes():
+    known = np.array([1, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 0, 0], dtype=bool)
+    assert np.flatnonzero(in_holes(known, 3)).tolist() == [7, 8, 9]
+    assert np.flatnonzero(in_holes(known, 2)).tolist() == [1, 2, 7, 8, 9, 11, 12]
+    assert in_holes(np.zeros(4, dtype=bool), 3).all()

@@ -274,7 +274,7 @@ def test_of_many_numbers_the_sentence_tells_the_surest():
         ([], "unexplained: yaw = (0.001) cos(heading)."),
         (
             ["current"],
-            "unexplained: yaw = (0.001) cos(heading). Without explaining the most of it, current would help.",
+            "unexplained: yaw = (0.001) cos(heading). Without explaining most of it, current would help.",
         ),
     ],
 )

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,7 +19,15 @@ from fish_bag import sample_recordings as samples
 from fish_bag.trial import Trial
 from fish_report import robofish as command
 from fish_report.errors import UserError
-from fish_sysid.dataset.experiment import Experiment, ExperimentError, build_experiment, shorten
+from fish_sim.robot import Robot
+from fish_sim.robot_file import save_robot
+from fish_sysid.dataset.experiment import (
+    Experiment,
+    ExperimentError,
+    Headings,
+    build_experiment,
+    shorten,
+)
 from fish_sysid.dataset.read import heading, read_days, read_experiment
 
 
@@ -57,6 +66,14 @@ def posed(
         for t in np.arange(0.005, duration, 1.0 / rate)
     ]
     return sorted([*others, *seen], key=lambda m: m[0])
+
+
+def moved(messages, metres, topic="/fish/camera/pose"):
+    """The messages with what the camera shows moved along x, so that no two recordings have the same images."""
+    for _, name, message, *_ in messages:
+        if name == topic:
+            message.pose.pose.position.x += metres
+    return messages
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +136,21 @@ def test_a_trial_in_which_too_many_commands_were_lost_is_refused(tmp_path: Path)
         build_experiment([trial])
 
 
+def test_a_recording_of_a_controller_that_lagged_is_used_and_said(tmp_path: Path) -> None:
+    """Half of the commands are recorded, at random; the rotor followed all of them."""
+    random = np.random.default_rng(0)
+    messages = [
+        m
+        for m in samples.robot_messages(3.0)
+        if m[1] != "/fish/joint_command" or random.random() < 0.5
+    ]
+    samples.write_mcap(tmp_path / "late", messages)
+    experiment, left_out = read_experiment(tmp_path / "late")
+    assert np.isnan(experiment.encoder).all()
+    (text,) = [text for text in left_out if "commands come irregularly" in text]
+    assert heading(text) == "Used with a fault"
+
+
 def test_trials_stand_side_by_side_padded_to_the_longest(tmp_path: Path) -> None:
     short, long = (
         read(tmp_path / n, samples.robot_messages(s)) for n, s in (("short", 1.0), ("long", 2.0))
@@ -147,8 +179,10 @@ def test_the_rest_of_a_trial_begins_in_motion_with_its_own_clock(swum: Experimen
 
 
 def test_a_shortened_experiment_has_its_first_steps(swum: Experiment) -> None:
-    begun = shorten(swum, 120)
+    turned = Headings(0.01 * np.arange(500), np.zeros(500))
+    begun = shorten(replace(swum, headings=(turned,)), 120)
     assert begun.steps.tolist() == [120]
+    assert len(begun.headings[0].t) == len(begun.headings[0].psi) == 120
     np.testing.assert_array_equal(begun.commands, swum.commands[:120])
     assert shorten(swum, 1000).steps.tolist() == [501]
 
@@ -196,8 +230,9 @@ def test_who_knows_no_rate_does_not_start_at_rest_unless_told(tmp_path: Path) ->
     ("topic", "first", "text"),
     [
         ("joint_command", 0.0, "no joint_command; the inputs"),
-        ("camera/pose", 0.05, "no camera/pose; at least three poses"),
-        ("joint_command", 0.05, "2 camera poses between the first and the last command"),
+        ("camera/pose", 0.0, "no camera/pose; at least three poses"),
+        ("camera/pose", 0.05, "2 of 2 camera poses lie between .*; at least three"),
+        ("joint_command", 0.05, "2 of 60 camera poses lie between the first and the last command"),
     ],
 )
 def test_recordings_without_inputs_or_poses_are_refused(
@@ -213,8 +248,8 @@ def test_no_trial_is_refused() -> None:
 
 
 def test_what_cannot_be_read_is_left_out_and_said(tmp_path):
-    for name in ("a", "b"):
-        samples.robot_recording(tmp_path / name)
+    for i, name in enumerate(("a", "b")):
+        samples.write_mcap(tmp_path / name, moved(samples.robot_messages(), 0.001 * i))
     broken = next(samples.robot_recording(tmp_path / "c").rglob("*.mcap"))
     broken.write_bytes(broken.read_bytes()[: broken.stat().st_size // 2])
     experiment, left_out = read_experiment(tmp_path)
@@ -306,9 +341,60 @@ def test_poses_that_came_and_are_not_used_are_said(tmp_path, change, text):
         read_experiment(tmp_path)
 
 
+def _in_the_frame_imu(i, t, m):
+    m.header.frame_id = "imu"
+    return t, m
+
+
+def _not_measured(i, t, m):
+    m.linear_acceleration_covariance[0] = -1.0
+    return t, m
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (_in_the_frame_imu, "200 of 200 messages in frame 'imu', expected 'imu_link'"),
+        (_not_measured, "200 of 200 messages say by a covariance of -1"),
+        (_of_another_type, "200 messages of type std_msgs/msg/Float64, expected sensor_msgs"),
+    ],
+)
+def test_an_imu_that_came_and_is_not_used_is_said_of_a_trial_that_is(tmp_path, change, text):
+    messages = samples.changed(samples.robot_messages(), "/fish/imu/data", change)
+    samples.write_mcap(tmp_path / "a", messages)
+    experiment, (said,) = read_experiment(tmp_path)
+    assert np.isnan(experiment.gyro).all()
+    assert said.startswith(f"a /fish/imu/data: {text}")
+    assert said.endswith("; not used; the rest of the recording is")
+    assert heading(said) == "Used with a fault"
+
+
+def test_an_imu_that_cannot_be_decoded_is_said_of_a_trial_that_is_used(tmp_path):
+    with samples.McapRecording(tmp_path / "a") as recording:
+        for arrival_ns, topic, message in samples.robot_messages():
+            raw = bytes(samples.typestore().serialize_cdr(message, message.__msgtype__))
+            entry = recording.add_topic(topic, message.__msgtype__)
+            recording.write(entry, arrival_ns, raw[:17] if topic == "/fish/imu/data" else raw)
+    _, (said,) = read_experiment(tmp_path)
+    assert said.startswith("a /fish/imu/data: none of 200 messages can be decoded")
+    assert heading(said) == "Used with a fault"
+
+
+def test_an_encoder_without_an_angle_is_used(tmp_path):
+    def without_angle(i, t, m):
+        m.position = np.zeros(0)
+        return t, m
+
+    messages = samples.changed(samples.robot_messages(), "/fish/joint_states", without_angle)
+    samples.write_mcap(tmp_path / "a", messages)
+    experiment, said = read_experiment(tmp_path)
+    assert np.isfinite(experiment.encoder[:200]).all()
+    assert said == []
+
+
 def test_trials_of_one_name_are_told_apart_by_their_folders(tmp_path):
-    for place in ("may/swims/a", "june/swims/a", "june/swims/b"):
-        samples.robot_recording(tmp_path / place)
+    for i, place in enumerate(("may/swims/a", "june/swims/a", "june/swims/b")):
+        samples.write_mcap(tmp_path / place, moved(samples.robot_messages(), 0.001 * i))
     experiment, _ = read_experiment(tmp_path / "may" / "swims", tmp_path / "june" / "swims")
     assert experiment.names == ("may/swims/a", "june/swims/a", "b")
 
@@ -317,6 +403,79 @@ def test_a_recording_given_twice_is_refused(tmp_path):
     samples.robot_recording(tmp_path / "a")
     with pytest.raises(UserError, match="a: given twice; expected every recording once"):
         read_experiment(tmp_path, tmp_path / "a")
+
+
+def test_a_copy_in_one_data_set_is_refused(tmp_path):
+    """One could be held out while the other trains."""
+    samples.robot_recording(tmp_path / "a")
+    shutil.copytree(tmp_path / "a", tmp_path / "b")
+    with pytest.raises(UserError, match=r"b and .*a: the same recording; expected every recording"):
+        read_experiment(tmp_path)
+
+
+@pytest.mark.parametrize("copy_first", [True, False])
+def test_a_copy_of_a_part_is_refused(tmp_path, copy_first):
+    messages, names = samples.robot_messages(), ("b", "a") if copy_first else ("a", "b")
+    for name, part in zip(names, (messages, messages[300:-60]), strict=True):
+        samples.write_mcap(tmp_path / name, part)
+    text = r"b and .*a: the same recording in part, \d+ of \d+ moves between images; expected every"
+    with pytest.raises(UserError, match=text):
+        read_experiment(tmp_path)
+
+
+def test_rest_at_one_place_and_a_short_overlap_make_no_copies(tmp_path):
+    def rests(x: float) -> Callable[[float], np.ndarray]:
+        return lambda t: np.array([0.3 + x * max(t - 1.5, 0.0), 0.2, 0.1])
+
+    for i, x in enumerate((0.1, 0.2)):
+        samples.write_mcap(tmp_path / "rest" / f"{i}", posed(rests(x)))
+    assert len(read_experiment(tmp_path / "rest")[0].names) == 2
+    messages = samples.robot_messages(4.0)
+    for name, part in (("a", messages[:1500]), ("b", messages[1000:])):
+        samples.write_mcap(tmp_path / "overlap" / name, part)
+    assert len(read_experiment(tmp_path / "overlap")[0].names) == 2
+
+
+@pytest.mark.parametrize("word", ["/fish/", "camera"])
+def test_a_trial_whose_clock_is_set_back_is_left_out(tmp_path, word):
+    for name, by in (("a", 0.0), ("b", 0.5037), ("c", 0.055)):
+        messages = moved(samples.robot_messages(3.0), 0.001 * len(name) + by)
+        for t, topic, message in messages:
+            if word in topic and hasattr(message, "header") and t > samples.ns(1.5):
+                samples.shift_stamp(message, -by)
+        samples.write_mcap(tmp_path / name, messages)
+    experiment, said = read_experiment(tmp_path)
+    assert experiment.names == ("a", "c")
+    (left_out,) = (text for text in said if heading(text) == "Left out")
+    assert left_out.startswith("b /fish/camera/pose")
+    assert ("/fish/joint_command" in left_out) == (word == "/fish/")
+    assert "the clock is set back by 0.5" in left_out
+    assert "let the time service slew it, and record again" in left_out
+    told = [text for text in said if text.startswith("c ")]
+    assert any("/fish/camera/pose: the clock is set back by 0.05" in text for text in told)
+    assert {heading(text) for text in told} == {"Used with a fault"}
+
+
+def test_a_gyro_that_freezes_is_not_used_from_then_on(tmp_path):
+    def freezes(i, t, m):
+        m.angular_velocity.z = min(m.angular_velocity.z, 1.0)
+        return t, m
+
+    messages = samples.changed(samples.robot_messages(4.0), "/fish/imu/data", freezes)
+    samples.write_mcap(tmp_path / "a", messages)
+    experiment, (said,) = read_experiment(tmp_path)
+    assert "gyro z stay at one value while the rotor moves" in said
+    assert heading(said) == "Used with a fault"
+    assert np.isfinite(experiment.gyro[:100]).all()
+    assert not np.isfinite(experiment.gyro[110:]).any()
+
+
+def test_dead_cameras_make_no_copies(tmp_path):
+    for name in ("a", "b"):
+        samples.write_mcap(tmp_path / name, posed(lambda t: np.array([0.1, 0.2, 0.3])))
+    experiment, said = read_experiment(tmp_path)
+    assert experiment.names == ("a", "b")
+    assert all("is the sensor alive?" in text for text in said)
 
 
 def test_an_imu_without_an_orientation_still_measures(tmp_path):
@@ -345,7 +504,7 @@ def test_a_unit_that_no_fit_can_mend_is_said_of_its_trial(tmp_path):
         m.position = np.array([m.position[0], 20.0 * (-1) ** (i // 50)])
         return t, m
 
-    messages = samples.robot_messages()
+    messages = moved(samples.robot_messages(), 0.001)
     samples.robot_recording(tmp_path / "a")
     samples.write_mcap(tmp_path / "b", samples.changed(messages, "/fish/joint_command", in_degrees))
     experiment, said = read_experiment(tmp_path)
@@ -373,14 +532,6 @@ def test_an_effect_that_nobody_knows_is_refused_before_anything_is_read(tmp_path
     for given in ("tip_slipp", "choose,tip_slip"):
         assert command.main(["identify", str(tmp_path), "--effects", given]) == 1
         assert f"unknown candidate '{given.split(',')[0]}'" in capsys.readouterr().err
-
-
-def moved(messages, metres, topic="/fish/camera/pose"):
-    """The messages with what the camera shows moved along x, so that no two days have the same images."""
-    for _, name, message, *_ in messages:
-        if name == topic:
-            message.pose.pose.position.x += metres
-    return messages
 
 
 def test_a_recording_of_two_days_is_refused_also_as_a_copy(tmp_path):
@@ -411,6 +562,27 @@ def test_a_unit_of_one_day_alone_makes_it_not_comparable(tmp_path):
     assert told[0].startswith("NEW a /fish/imu/data")
 
 
+def test_a_dead_sensor_of_one_day_is_not_hidden_by_another_of_the_other_day(tmp_path):
+    def dead_gyro(i, t, m):
+        m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z = 0.0, 0.0, 0.3
+        return t, m
+
+    def dead_encoder(i, t, m):
+        m.velocity[:] = 0.0
+        return t, m
+
+    for day, topic, change in (
+        ("new", "imu/data", dead_gyro),
+        ("old", "joint_states", dead_encoder),
+    ):
+        messages = samples.changed(samples.robot_messages(), f"/fish/{topic}", change)
+        samples.write_mcap(tmp_path / day / "a", moved(messages, 0.001 * (day == "new")))
+    why = read_days([tmp_path / "new"], [tmp_path / "old"])[3]
+    assert why is not None
+    assert why.startswith("a /fish/imu/data: gyro is")
+    assert "in 1 of 1 trials of NEW and in none of OLD" in why
+
+
 def test_images_that_are_all_refused_say_why(tmp_path):
     messages = samples.robot_messages()
     random = np.random.default_rng(0)
@@ -429,3 +601,52 @@ def test_options_of_the_search_are_refused_with_a_baseline(tmp_path, capsys):
         given = [str(tmp_path), "--baseline", str(tmp_path), "--out", str(tmp_path / "out")]
         assert command.main(["diagnose", *given, option, value]) == 1
         assert f"{option} goes without --baseline" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "taken"),
+    [
+        ("predict {0}/day --model {0}/model.yaml --out {0}/day/a/a.mcap", "day/a/a.mcap"),
+        ("predict {0}/day/a --model {0}/model.yaml --out {0}/day/a/metadata.yaml", "metadata.yaml"),
+        ("predict {0}/day/a --model {0}/model.yaml --out {0}/model.yaml", "model.yaml"),
+        ("identify {0}/day --robot {0}/robot.yaml --out {0}", "robot.yaml"),
+        ("diagnose {0}/day --robot {0}/model.yaml --out {0}", "model.yaml"),
+        ("diagnose {0}/day --robot {0}/model.yaml --out {0} --baseline {0}/old", "model.yaml"),
+        ("distinguish {0}/plan.json --out {0}/plan.json", "plan.json"),
+        ("plan_calibration --robot {0}/robot.yaml --out {0}/robot.yaml", "robot.yaml"),
+    ],
+)
+def test_no_verb_replaces_what_it_reads(tmp_path, capsys, words, taken):
+    for day, metres in (("old", 0.0), ("day", 0.001)):
+        samples.write_mcap(tmp_path / day / "a", moved(samples.robot_messages(), metres))
+    for name in ("robot.yaml", "model.yaml"):
+        save_robot(Robot(), tmp_path / name)
+    row = {"t": 0, "amplitude": 8, "frequency": 2, "rudder": 0.3}
+    (tmp_path / "plan.json").write_text(json.dumps([row]))
+    files = sorted(path for path in tmp_path.rglob("*") if path.is_file())
+    before = [path.read_bytes() for path in files]
+    assert command.main(words.format(tmp_path).split()) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"{taken} is the input" in said
+    assert "choose another --" in said
+    assert sorted(path for path in tmp_path.rglob("*") if path.is_file()) == files
+    assert [path.read_bytes() for path in files] == before
+
+
+def test_a_verdict_without_a_model_leaves_none_of_an_earlier_one(tmp_path):
+    for day, metres in (("old", 0.0), ("new", 0.001)):
+        messages = moved(samples.robot_messages(), metres)
+        for _, topic, message, *_ in messages:
+            if day == "new" and topic == "/fish/imu/data":
+                for axis in "xyz":
+                    force = message.linear_acceleration
+                    setattr(force, axis, getattr(force, axis) / 9.81)
+        samples.write_mcap(tmp_path / day / "a", messages)
+    out = tmp_path / "out"
+    out.mkdir()
+    save_robot(Robot(), out / "model.yaml")
+    given = [str(tmp_path / "new"), "--baseline", str(tmp_path / "old"), "--out", str(out)]
+    assert command.main(["diagnose", *given]) == 0
+    assert sorted(path.name for path in out.iterdir()) == ["diagnosis.json", "report.html"]
+    content = json.loads((out / "diagnosis.json").read_text())
+    assert content["change"]["verdict"] == "not_comparable"

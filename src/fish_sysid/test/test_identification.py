@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from swims import GIVEN, fish
 
+from fish_bag import sample_recordings as samples
 from fish_sim.robot import Robot
 from fish_sim.robot_file import load_robot
 from fish_sysid.coverage import (
@@ -21,11 +22,13 @@ from fish_sysid.coverage import (
     summarise,
 )
 from fish_sysid.dataset.experiment import Experiment, Frames
+from fish_sysid.dataset.read import read_experiment
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.identification import (
     FITTED_FOR_OUTLOOK,
     NOT_CHOSEN,
+    TOO_SHORT,
     Identification,
     identify,
     split,
@@ -85,11 +88,25 @@ def test_a_model_that_lacks_something_is_fitted_to_what_it_is_for() -> None:
     assert FITTED_FOR_OUTLOOK in found.statements
     at_5_s = [found.errors[robot].rms[-1, 0] for robot in ("start", "identified")]
     assert at_5_s[1] < 0.5 * at_5_s[0]
+    late = replace(trials, frames=tuple(Frames(f.t + 0.3, f.pose) for f in trials.frames))
+    stating = GIVEN.with_effect("camera_latency", delay=0.3)
+    again = identify(late, stating, free=FREE, links=(1,))
+    assert FITTED_FOR_OUTLOOK in again.statements
+    assert again.robot.sensors["camera_latency"]["delay"] == pytest.approx(0.3, abs=0.02)
+    assert any("as the robot states" in text for text in again.statements)
+
+
+def test_trials_that_no_fish_has_swum_and_that_are_too_short_to_predict_are_fitted_with_a_warning(
+    tmp_path,
+) -> None:
+    samples.write_mcap(tmp_path / "short", samples.robot_messages(4.0))
+    trials, _ = read_experiment(tmp_path / "short")
+    assert TOO_SHORT in identify(trials, GIVEN, free=FREE).statements
 
 
 def test_that_the_images_age_is_not_known_without_a_gyro_is_said(found: Identification) -> None:
     assert AGE_UNKNOWN not in found.statements
-    trials = experiment_of(("sines", "random", "steps"), 6.0)
+    trials = experiment_of(("sines", "steps"), 4.0)
     blind = identify(replace(trials, gyro=np.full_like(trials.gyro, np.nan)), Robot(), free=FREE)
     assert AGE_UNKNOWN in blind.statements
     known = Robot().with_effect("camera_latency", delay=0.1)
@@ -154,7 +171,7 @@ def test_one_trial_without_imu_and_encoder() -> None:
     text = " ".join(result.statements)
     assert "no trial was held out" in text
     assert "no IMU" in text
-    assert "no encoder" in text
+    assert "no encoder sample to compare in synthetic_00" in text
     error = np.log(result.fit.values["head_drag_surge"] / TRUTH.parameters["head_drag_surge"])
     assert abs(error) < 0.5
 

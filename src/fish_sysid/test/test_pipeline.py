@@ -9,22 +9,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from swims import GIVEN, fish, swim
+from swims import GIVEN, World, fish, kinematic_swims, swim
 
 from fish_sim.effects import EFFECTS
 from fish_sim.effects.hull import QuadraticDrag
+from fish_sim.robot import Robot
 from fish_sim.robot_file import load_robot, save_robot
+from fish_sysid.dataset.synthetic import with_current, with_image_age
 from fish_sysid.diagnosis import pipeline
 from fish_sysid.diagnosis.can_follow import INTRINSIC, TOO_FAR, missed_by, missed_with
 from fish_sysid.diagnosis.conclusion import shares
 from fish_sysid.diagnosis.corrected_model import corrected
 from fish_sysid.diagnosis.diagnosis_json import answer
 from fish_sysid.diagnosis.latent_force import dof_shares
+from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 from fish_sysid.diagnosis.task import STAGES, make_task
 from fish_sysid.diagnosis.vocabulary import NoCandidateError, candidates
 from fish_sysid.estimation.ekf_types import Noise
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.refit import REFIT, refit
+from fish_sysid.estimation.shooting.schedule import misfit
 from fish_sysid.reports.diagnosis_page import write_diagnosis_page
 from fish_sysid.reports.verdict_sentence import sentence
 
@@ -202,6 +207,30 @@ def test_a_model_that_lacks_a_flow_which_varies_over_the_pool_can_follow_the_fis
     task = make_task(data, GIVEN)
     assert missed_with([*INTRINSIC, "current"], GIVEN, task) > TOO_FAR
     assert missed_by(task) is None
+
+
+def test_a_model_that_states_the_age_of_its_images_can_follow_the_fish():
+    """It would otherwise miss by thirteen times the camera's noise: its clock could move by 0.08 s alone."""
+    robot = fish().with_effect("camera_latency", delay=0.16)
+    late = with_image_age(swim(fish(), duration=7.0), 0.16)
+    noise = usual_noise(late)
+    assert misfit(late, robot, noise, ("head_drag_surge",)) < 1.5
+    assert misfit(late, fish(), noise, ("head_drag_surge",)) > TOO_FAR
+
+
+def test_numbers_of_a_symmetry_in_the_model_know_no_held_out_trial():
+    """The flow is another one in the trials that score the model."""
+    still = kinematic_swims(World(), trials=12)
+    flows = [with_current(still, (x, 0.0)) for x in (0.05, 0.08)]
+    frames = tuple(flows[m % 3 == 2].frames[m] for m in range(12))
+    task = make_task(replace(still, frames=frames), Robot())
+    symmetry = symmetry_findings(task.experiment, task.robot)
+    told, known = (
+        next(f for f in findings if f.name == "current").parameters["x"].value
+        for findings in (symmetry, pipeline.of_training(symmetry, task))
+    )
+    assert told == pytest.approx(0.06, abs=0.003)
+    assert known == pytest.approx(0.05, abs=0.001)
 
 
 def test_of_two_effects_each_has_its_own_place():

@@ -208,7 +208,7 @@ def test_a_heading_a_whole_turn_off_is_no_error() -> None:
 
 
 def test_bad_horizon_is_refused(quiet: Experiment) -> None:
-    for horizon in (0.0, -1.0, np.nan):
+    for horizon in (0.0, -1.0, np.nan, 1e9):
         with pytest.raises(ValueError, match="horizon"):
             predict(quiet, ROBOT, Noise(), horizon)
 

@@ -103,6 +103,11 @@ def test_the_cell_of_the_pool_in_which_a_force_acts_is_found(pushed: MissingForc
     assert right - left < 1.0
 
 
+def test_a_force_beyond_the_map_is_in_no_cell(pushed: MissingForce) -> None:
+    far = {**pushed.covariates, "x": pushed.covariates["x"] + 100.0}
+    assert place_shares(replace(pushed, covariates=far), UNIT) == []
+
+
 def test_the_covariate_is_found_in_whose_range_a_force_acts(pushed: MissingForce) -> None:
     rows = {row["name"]: row for row in covariate_shares(pushed, UNIT)}
     assert rows["rudder"]["range"] == pytest.approx([0.3, 0.5], abs=0.06)  # over two bins

@@ -21,7 +21,7 @@ from fish_sysid.diagnosis.backward_elimination import eliminate, exchanged, riva
 from fish_sysid.diagnosis.cross_validation import gain_left_out, gain_unseen, on_all, predicted
 from fish_sysid.diagnosis.diagnosis_json import competition
 from fish_sysid.diagnosis.forward_selection import Selection, choose, predicts_unseen, significant
-from fish_sysid.diagnosis.model_order import better_order, fit_links, promises_more, with_links
+from fish_sysid.diagnosis.model_order import better_order, fit_links, promises_more
 from fish_sysid.diagnosis.pipeline import fit_nominal
 from fish_sysid.diagnosis.residual_regression import Law
 from fish_sysid.diagnosis.result import Accepted, Round, Screened
@@ -53,6 +53,7 @@ from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import climb, evaluate
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, nominal_hypothesis
 from fish_sysid.estimation.refit import CONTINUE, REFIT, alternate, refit
+from fish_sysid.estimation.shooting.prediction_fit import with_links
 from fish_sysid.estimation.thresholds import (
     NEAR_GAIN,
     OPEN_GATE,
@@ -130,6 +131,19 @@ def test_a_base_at_its_best_optimum_stays_when_restarted_from_a_rival():
     with_scale = hypothesis.with_effect("gyro_scale")
     rival = evaluate(with_scale, np.append(good.theta + 0.1, 0.0), data, good.noise)
     assert restart_base(good, rival, Trials(data, data, data, ())) is good
+
+
+def test_a_base_far_off_takes_the_optimum_that_a_rival_leads_to():
+    """Also where a refit of short trials leads the base to that optimum as well."""
+    data = swim(fish(), kinds=("sines", "steps"), duration=4.0)
+    hypothesis = nominal_hypothesis(GIVEN, ("head_drag_surge", "head_drag_sway", "tail_stiffness"))
+    good = refit(hypothesis, np.log([1.3, 0.8, 1.1]), data, Noise(), REFIT)
+    poor = evaluate(hypothesis, good.theta + 0.5, data, good.noise)
+    with_scale = hypothesis.with_effect("gyro_scale")
+    rival = evaluate(with_scale, np.append(good.theta + 0.05, 0.0), data, good.noise)
+    restarted = restart_base(poor, rival, Trials(data, data, data, ()))
+    assert restarted.log_posterior > good.log_posterior - 3.0
+    np.testing.assert_allclose(restarted.theta, good.theta, atol=0.02)
 
 
 def test_a_base_far_off_is_screened_by_annealing_and_the_right_name_leads():
@@ -576,6 +590,9 @@ def test_another_link_is_tried_where_this_number_explains_more_or_leaves_half_th
     assert promises_more(made_fit(101.0, ratio=10.0), best)
     assert promises_more(made_fit(50.0, ratio=4.0), best)
     assert not promises_more(made_fit(50.0, ratio=6.0), best)
+    far = made_fit(100.0, ratio=200.0)
+    assert not promises_more(made_fit(50.0, ratio=50.0), far)
+    assert promises_more(made_fit(101.0, ratio=50.0), far)
 
 
 @pytest.mark.parametrize(("links", "needed"), [(2, 2), (1, None)])
@@ -633,7 +650,7 @@ def test_what_is_not_excited_is_not_judged():
     assert {"rudder_lag", "rudder_gain", "rudder_placement"} <= unseen
     assert not {"rudder_offset", "current"} & set(not_excited(still))
     blind = replace(still, gyro=np.full_like(still.gyro, np.nan))
-    assert not_excited(blind)["gyro_scale"] == "no IMU was recorded"
+    assert not_excited(blind)["gyro_scale"] == "no IMU sample can be used"
     drifting = replace(still, commands=still.commands * [0.0, 1.0])
     rotor = {"rotor_lag", "rotor_saturation", "battery_sag", "rotor_imbalance"}
     assert reasons(drifting, "the rotor never moved") == rotor

@@ -47,7 +47,6 @@ from fish_sysid.estimation.shooting.prediction_fit import (
 )
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS, cut, regular_starts
 from fish_sysid.estimation.shooting.rollout import (
-    Directions,
     ShotParametrization,
     memories,
     poses_and_slopes,
@@ -130,13 +129,13 @@ def test_slopes_are_the_tangents_of_the_motion() -> None:
     shooting = shooting_on(experiment, 1.0)
     guess = shooting.first_guess(shooting.coordinates.origin() + 0.1)
     p, dp, _ = shooting.coordinates.filter_inputs(guess.theta)
-    directions, stepper = Directions.of(p, dp), shooting.coordinates.stepper
-    memory = memories(stepper, experiment, shooting.windows, directions)
-    pose, slope = poses_and_slopes(stepper, shooting.windows, directions, memory, guess.x)
-    start = np.concatenate([guess.x, memory[0]], axis=1)
+    stepper, windows = shooting.coordinates.stepper, shooting.windows
+    pose, slope = poses_and_slopes(stepper, experiment, windows, p, dp, guess.x)
+    memory = memories(stepper, experiment, windows, p[None])[0]
+    start = np.concatenate([guess.x, memory], axis=1)
     for j in range(len(dp)):
         value, tangent = stepper.rollout_jvp(
-            start, shooting.windows.commands, p, np.zeros_like(start), np.zeros((1, 1, 2)), dp[j]
+            start, windows.commands, p, np.zeros_like(start), np.zeros((1, 1, 2)), dp[j]
         )
         assert pose == pytest.approx(value[..., :3], abs=1e-12)
         size = np.abs(tangent[..., :3]).max()
@@ -287,6 +286,16 @@ def fitted(experiment: Experiment) -> Found:
     return polished(experiment, start, 2.0, 2)
 
 
+def test_of_one_trial_the_spread_over_folds_is_not_known() -> None:
+    experiment = swum(Robot(links=1))
+    for trials, known in (([0], False), ([0, 1], True)):
+        some = experiment.select(trials)
+        hypothesis = nominal_hypothesis(Robot(links=1), BAND_FREE)
+        found = Found(hypothesis, np.zeros(len(BAND_FREE) + len(SENSORS)), np.inf)
+        _, spread = uncertainty(some, found)
+        assert (np.isfinite(spread) == known).all()
+
+
 def test_bands_hold_errors_of_unseen_trials_of_a_fish_that_the_model_is_not() -> None:
     experiment = swum(Robot(links=1).with_effect("tip_slip", mobility=0.3))
     training, unseen = experiment.select(SEEN), experiment.select(UNSEEN)
@@ -352,6 +361,8 @@ def test_a_nested_model_that_costs_more_than_its_submodel_starts_again() -> None
     fit, costs = converged(experiment, [far, near], found.cost)
     assert fit.cost < 1.01 * found.cost
     assert np.isfinite(costs).all()
+    best, _ = converged(experiment, [near, far], 0.0)  # neither ends as low
+    assert best.cost == fit.cost
 
 
 def test_iterations_are_no_evidence_where_nothing_is_concealed() -> None:

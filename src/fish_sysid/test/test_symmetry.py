@@ -12,6 +12,7 @@ from swims import World, kinematic_swims
 
 from fish_report.files import plain
 from fish_sim.effects import EFFECTS
+from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.synthetic import with_current, with_image_age
@@ -27,6 +28,7 @@ from fish_sysid.diagnosis.symmetry.outcome import (
     with_findings,
     with_symmetry,
 )
+from fish_sysid.diagnosis.symmetry.regression import evidence
 from fish_sysid.reports.diagnosis_page import symmetry_table
 from fish_sysid.reports.verdict_sentence import sentence
 
@@ -61,6 +63,83 @@ def test_what_is_hidden_comes_back_within_its_errors(world, name, truth, floor):
         estimate = found.parameters[key]
         assert estimate.value == pytest.approx(value, abs=4.0 * estimate.std + floor)
         assert estimate.std < max(0.3 * abs(value), 0.02)
+
+
+def read_every(experiment: Experiment, steps: int, first: int = 0) -> Experiment:
+    """The experiment with an IMU that is read at every so many grid points alone."""
+    lost = np.arange(experiment.length) % steps != first
+    gyro, accel = experiment.gyro.copy(), experiment.accel.copy()
+    gyro[lost], accel[lost] = np.nan, np.nan
+    return replace(experiment, gyro=gyro, accel=accel)
+
+
+@pytest.mark.parametrize(("steps", "first"), [(1, 0), (2, 0), (2, 1), (3, 1), (5, 0)])
+def test_a_slower_and_noisier_imu_tells_the_camera_s_scale(steps, first):
+    """The fewer the samples, the more their noise pulls the factor to zero: it is divided by the share that is no noise."""
+    made = kinematic_swims(World(camera_factor=1.1), seed=1, trials=12)
+    noise = np.random.default_rng(1).standard_normal(made.accel.shape)
+    noisy = replace(made, accel=made.accel + 0.15 * noise)
+    found = answers(read_every(noisy, steps, first))["camera_scale"]
+    assert found.status != "cannot tell"
+    factor = found.parameters["factor"]
+    assert factor.value == pytest.approx(1.1, abs=3.0 * factor.std + 0.01)
+    assert factor.std < 0.07
+
+
+def test_an_imu_that_misses_strokes_is_said_to_be_too_slow():
+    found = answers(read_every(kinematic_swims(World()), 20))["camera_scale"]
+    assert found.status == "cannot tell"
+    assert "the IMU at 10 Hz or more" in found.reason
+
+
+def silent(experiment: Experiment, first: float, last: float) -> Experiment:
+    """The IMU says nothing for these seconds of every trial."""
+    a, b = round(first / DT), round(last / DT)
+    gyro, accel = experiment.gyro.copy(), experiment.accel.copy()
+    gyro[a:b], accel[a:b] = np.nan, np.nan
+    return replace(experiment, gyro=gyro, accel=accel)
+
+
+@pytest.mark.parametrize(("first", "last"), [(4.0, 6.0), (3.0, 3.4), (8.0, 99.0)])
+def test_where_the_imu_pauses_nothing_is_made_up(null, first, last):
+    found = answers(silent(null, first, last))
+    assert not [f.statement for f in found.values() if f.status == "found"]
+    gyro = found["gyro_scale"]
+    assert gyro.status == "not found"
+    assert gyro.parameters["factor"].value == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_wrong_scale_is_found_beside_pauses():
+    hidden = kinematic_swims(World(gyro_factor=1.05, camera_factor=1.1), seed=1)
+    found = answers(silent(hidden, 4.0, 4.5))
+    assert found["gyro_scale"].status == "found"
+    assert found["gyro_scale"].parameters["factor"].value == pytest.approx(1.05, abs=0.005)
+    assert found["camera_scale"].status == "cannot tell"
+    assert "without pauses" in found["camera_scale"].reason
+
+
+def jumping(experiment: Experiment) -> Experiment:
+    """Images of the second half of every trial are stamped 1.5 s late."""
+    half = 0.5 * DT * len(experiment.commands)
+    frames = [replace(f, t=np.where(f.t < half, f.t, f.t + 1.5)) for f in experiment.frames]
+    return replace(experiment, frames=tuple(frames))
+
+
+def without_heading(experiment: Experiment) -> Experiment:
+    """A tracker that never sets the heading."""
+    flat = [replace(f, pose=f.pose * np.array([1.0, 1.0, 0.0])) for f in experiment.frames]
+    return replace(experiment, frames=tuple(flat))
+
+
+@pytest.mark.parametrize("change", [jumping, without_heading])
+def test_camera_and_gyro_that_do_not_turn_together_tell_no_scale(null, change):
+    scale = answers(change(null))["gyro_scale"]
+    assert scale.status == "cannot tell"
+    assert "camera and gyro do not turn together" in scale.reason
+
+
+def test_a_gain_that_is_no_number_is_no_evidence():
+    assert evidence(np.array([np.nan, 1.0, 2.0])).p_value == 1.0
 
 
 def test_old_images_are_found_and_the_flow_beside_them(null):
@@ -119,15 +198,15 @@ def without(experiment: Experiment, *sensors: str) -> Experiment:
         (World(turns=False, one_heading=True), (), "camera_heading_offset", "too few headings"),
         (World(), ("gyro",), "camera_latency", "no gyro"),
         (World(), ("gyro",), "gyro_scale", "no gyro"),
-        (World(), ("gyro",), "IMU beside the command", "no gyro"),
+        (World(), ("gyro",), "IMU against the command", "no gyro"),
         (World(), ("accel",), "camera_scale", "no IMU"),
-        (World(), ("encoder",), "encoder behind the command", "no encoder"),
+        (World(), ("encoder",), "encoder behind the command", "or the measured speed drives"),
         (World(turns=False, swing=0.0), (), "camera_latency", "no turns"),
         (World(turns=False), (), "gyro_scale", "no turns"),
         (World(turns=False, speeds=(60.0, 60.0)), (), "imu_misalignment", "no turns and one speed"),
         (World(turns=False), (), "left and right differ", "the rudder is left in 0%"),
         (World(speeds=(1.0, 2.0)), (), "camera_heading_offset", "no course"),
-        (World(), (), "IMU beside the command", "the rotor starts from rest"),
+        (World(), (), "IMU against the command", "the rotor starts from rest"),
         (World(speeds=(1.0, 2.0)), (), "encoder behind the command", "the rotor changes in fewer"),
         (World(speeds=(1.0, 2.0), turns=False, flow=(0.0, 0.0)), (), "wall_effect", "near a wall"),
     ],
@@ -159,11 +238,21 @@ def test_of_two_trials_nothing_is_told(null):
 
 def test_a_gyro_that_answers_the_rotor_within_a_stroke_is_in_time():
     late = kinematic_swims(World(wait=1.5))
-    assert answers(late)["IMU beside the command"].status == "not found"
+    assert answers(late)["IMU against the command"].status == "not found"
     early = replace(late, gyro=np.roll(late.gyro, -20, axis=0))
-    answer = answers(early)["IMU beside the command"]
+    answer = answers(early)["IMU against the command"]
     assert answer.status == "found"
     assert answer.parameters["answer"].value == pytest.approx(-0.2, abs=0.05)
+
+
+def test_three_trials_that_answer_early_by_different_times_are_too_few():
+    """0.10, 0.14 and 0.18 s before the start: four standard errors from a limit, of which three trials ask for nineteen."""
+    late = kinematic_swims(World(wait=1.5), trials=3)
+    early = np.stack([np.roll(g, -k) for g, k in zip(late.gyro.T, (10, 14, 18), strict=True)], 1)
+    answer = answers(replace(late, gyro=early))["IMU against the command"]
+    estimate = answer.parameters["answer"]
+    assert estimate.value + 3.0 * estimate.std < -0.05
+    assert answer.status == "not found"
 
 
 def test_mirror_symmetry_alone_names_nothing():
@@ -252,7 +341,7 @@ WRITTEN_FLOW = SymmetryFinding(
     evidence=Evidence(0.7, 0.1, 1e-5),
 )
 BLIND = SymmetryFinding(
-    "gyro_scale", "sensor", "cannot tell", "a", "b", reason="no gyro was recorded"
+    "gyro_scale", "sensor", "cannot tell", "a", "b", reason="no gyro sample can be used"
 )
 
 
@@ -319,6 +408,10 @@ def test_the_sentence_says_what_symmetry_finds_and_what_is_left():
         "The water moves by (0.030 ± 0.003, -0.020 ± 0.001) m/s; beside that "
         "unexplained: yaw = (0.001) cos(heading)."
     )
+    both = content(with_symmetry([by_search("tip_slip")], (WRITTEN_FLOW,), EFFECTS))
+    both["fit"]["written"] = "with_effects"
+    said = sentence({**both, "verdict": "missing_physics"})
+    assert said.endswith("model.yaml is without current, which no fit of a model shows.")
     named = content(with_symmetry([by_search("current")], (WRITTEN_FLOW,), EFFECTS))
     assert sentence({**named, "verdict": "missing_physics"}) == (
         "missing_physics: the model lacks current (x 0.028 ± 0.001 m/s; probability 0.97)."
@@ -333,4 +426,11 @@ def test_the_page_shows_every_test_with_what_it_assumes_and_needs():
         "x 0.03 ± 0.003 m/s, y -0.02 ± 0.001 m/s",
         "0.70 ± 0.10",
     ]
-    assert table.rows[1] == ["gyro_scale", "cannot tell: no gyro was recorded", "", "", "a", "b"]
+    assert table.rows[1] == [
+        "gyro_scale",
+        "cannot tell: no gyro sample can be used",
+        "",
+        "",
+        "a",
+        "b",
+    ]

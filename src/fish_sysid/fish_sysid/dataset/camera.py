@@ -13,7 +13,7 @@ point that the camera follows become those of the head's centre of mass.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,8 @@ class Alignment:
     delay: float  # s, how much older than its stamp an image is; 0 where the data do not clearly say so
     rms: float  # rad, heading of the camera less that of the gyro at this delay
     rms_undelayed: float  # rad, the same without a delay
+    # (M, D) rad^2, mean squares at each of DELAYS of the trials that tell
+    squares: Array = field(default_factory=lambda: np.zeros((0, len(DELAYS))))
 
 
 def align(experiment: Experiment) -> Alignment:
@@ -54,7 +56,7 @@ def align(experiment: Experiment) -> Alignment:
     best = int(rms.argmin())
     clear = rms[best] < CLEAR * rms[0] and DELAYS[best] >= SMALLEST and best < len(DELAYS) - 1
     best = best if clear else 0
-    return Alignment(float(DELAYS[best]), float(rms[best]), float(rms[0]))
+    return Alignment(float(DELAYS[best]), float(rms[best]), float(rms[0]), squares[count > 0])
 
 
 def misfits(experiment: Experiment) -> tuple[Array, NDArray[np.int64]]:
@@ -112,7 +114,8 @@ def _misfit(t: Array, heading: Array, turned: Array, delays: Array) -> Array:
 def fine_delay(experiment: Experiment) -> tuple[float, float]:
     """Delay [s] between the grid's delays, by a parabola through the least mean squares, and its jackknife error over trials.
 
-    NaN where fewer than two trials have a gyro and enough poses.
+    NaN where fewer than two trials have a gyro and enough poses, and where the parabola is lowest more than half a step beyond
+    DELAYS: there it is extrapolated.
     """
     squares, count = misfits(experiment)
     used = squares[count > 0]
@@ -120,15 +123,20 @@ def fine_delay(experiment: Experiment) -> tuple[float, float]:
         return np.nan, np.nan
     left_out = np.array([_lowest(np.delete(used, m, 0).mean(axis=0)) for m in range(len(used))])
     spread = float(np.sqrt((len(used) - 1) / len(used) * ((left_out - left_out.mean()) ** 2).sum()))
-    return _lowest(used.mean(axis=0)), spread
+    delay, beyond = _lowest(used.mean(axis=0)), 0.5 * STEP
+    tried = DELAYS[0] - beyond <= delay <= DELAYS[-1] + beyond
+    return (delay, spread) if tried else (np.nan, np.nan)
 
 
 def _lowest(squares: Array) -> float:
-    """Where mean squares (D,) at DELAYS are least, by a parabola through the lowest three."""
-    best = int(np.clip(squares.argmin(), 1, len(squares) - 2))
+    """Where mean squares (D,) at DELAYS are least, by a parabola through the lowest three; NaN where they only fall to an end."""
+    least = int(squares.argmin())
+    best = int(np.clip(least, 1, len(squares) - 2))
     before, at, after = squares[best - 1 : best + 2]
     bend = before - 2.0 * at + after
-    return float(DELAYS[best] + (0.5 * STEP * (before - after) / bend if bend > 0.0 else 0.0))
+    if bend <= 0.0:
+        return float(DELAYS[best]) if best == least else np.nan
+    return float(DELAYS[best] + 0.5 * STEP * (before - after) / bend)
 
 
 def gyro_windows(experiment: Experiment, m: int) -> Array:

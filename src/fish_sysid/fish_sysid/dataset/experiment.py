@@ -15,12 +15,23 @@ from numpy.typing import NDArray
 
 from fish_bag.trial import Commands, Imu, Trial
 from fish_sim.model import DT
-from fish_sysid.dataset.commands import LostCommandsError, commands_on_grid, driven, held_rudder
-from fish_sysid.dataset.grid import apart, heading, level, on_grid, starts_at_rest
+from fish_sysid.dataset.commands import (
+    LostCommandsError,
+    commands_on_grid,
+    driven,
+    not_followed,
+)
+from fish_sysid.dataset.grid import (
+    FEWEST_POSES,
+    apart,
+    heading,
+    level,
+    on_grid,
+    starts_at_rest,
+)
 
 Array = NDArray[np.float64]
 
-FEWEST_POSES = 3
 LONGEST_UNKNOWN = 1.0  # s after the first command without camera and gyro: the heading is unknown
 STEPS_AT_ONCE = 8000  # grid points of a pass that keeps its history or has many derivatives: memory
 
@@ -117,7 +128,8 @@ def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None)
 
     start_at_rest None: as `starts_at_rest` finds for all trials together.
     Measurements before the first command or after the last one are left out: the rotor's speed is unknown then.
-    Raises ExperimentError when commands or camera poses are missing.
+    Raises ExperimentError without a trial, and for one without commands or with too few camera poses, with a gap in the commands
+    that is too long, or in which the fish may have turned too far before a sensor shows its heading.
     """
     if not trials:
         raise ExperimentError("no trial with data; expected at least one")
@@ -158,11 +170,10 @@ def _grid(trial: Trial) -> dict[str, Array]:
         raise ExperimentError(f"{trial.name}: no joint_command; the inputs of the fish are needed")
     c, imu, encoder = trial.commands, trial.imu, trial.encoder
     start, end = c.t[0], c.t[-1] + DT
-    count = int(np.floor((end - start) / DT + 1e-6)) + 1
-    t = start + DT * np.arange(count)
+    t = _times(c)
     frames = _seen(trial, start, end)
-    nothing = np.full(count, np.nan)
-    gyro, accel = nothing, np.full((count, 2), np.nan)
+    nothing = np.full(len(t), np.nan)
+    gyro, accel = nothing, np.full((len(t), 2), np.nan)
     headings = NO_HEADINGS
     if imu is not None:
         headings = _headings(imu, start, end)
@@ -170,7 +181,6 @@ def _grid(trial: Trial) -> dict[str, Array]:
     _check_heading(trial.name, frames, gyro)
     measured = nothing if encoder is None else on_grid(encoder.t, encoder.speed, t, DT)
     commands, measured = _commands(trial.name, c, t, measured)
-    commands[:, 1] = held_rudder(commands[:, 0], commands[:, 1])
     commands[:, 0], measured = driven(commands[:, 0], measured)
     return {
         "commands": commands,
@@ -184,6 +194,23 @@ def _grid(trial: Trial) -> dict[str, Array]:
     }
 
 
+def rotor_not_followed(trial: Trial) -> bool:
+    """Whether the rotor's measured speed drives the model, as commands come irregularly and it moves at other times."""
+    clean = trial.clean()
+    c, encoder = clean.commands, clean.encoder
+    if c is None or encoder is None:
+        return False
+    t = _times(c)
+    given = np.column_stack([c.rotor_speed, c.rudder])
+    return not_followed(c.t, given, t, on_grid(encoder.t, encoder.speed, t, DT))
+
+
+def _times(c: Commands) -> Array:
+    """The grid of a trial's commands, in its stamps."""
+    count = int(np.floor((c.t[-1] + DT - c.t[0]) / DT + 1e-6)) + 1
+    return np.asarray(c.t[0] + DT * np.arange(count))
+
+
 def _headings(imu: Imu, start: float, end: float) -> Headings:
     """What the IMU's orientation says while commands came."""
     t, psi = heading(imu)
@@ -194,12 +221,13 @@ def _headings(imu: Imu, start: float, end: float) -> Headings:
 def _seen(trial: Trial, start: float, end: float) -> Frames:
     """The camera's poses while commands came; of a camera that is faster than the grid those that each have a grid point."""
     camera = trial.camera
-    if camera is None or len(camera) < FEWEST_POSES:
+    if camera is None:
         raise ExperimentError(f"{trial.name}: no camera/pose; at least three poses are needed")
     seen = (camera.t >= start - 0.5 * DT) & (camera.t <= end)
     if seen.sum() < FEWEST_POSES:
         raise ExperimentError(
-            f"{trial.name}: {seen.sum()} camera poses between the first and the last command; at least three are needed"
+            f"{trial.name}: {seen.sum()} of {len(camera)} camera poses lie between the first and the last command; "
+            "at least three are needed"
         )
     kept = apart(camera.t[seen], DT)
     pose = np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)])
@@ -225,9 +253,14 @@ def _commands(name: str, c: Commands, t: Array, encoder: Array) -> tuple[Array, 
 
 
 def shorten(experiment: Experiment, steps: int) -> Experiment:
-    """The first `steps` grid points of every trial."""
+    """The first `steps` grid points of every trial; all its frames, as the first may come after them."""
     arrays = {k: getattr(experiment, k)[:steps] for k in ("commands", "gyro", "accel", "encoder")}
-    return replace(experiment, steps=np.minimum(experiment.steps, steps), **arrays)
+    felt = [h.t < DT * (steps - 0.5) for h in experiment.headings]
+    headings = tuple(
+        Headings(h.t[f], h.psi[f]) for h, f in zip(experiment.headings, felt, strict=True)
+    )
+    shorter = np.minimum(experiment.steps, steps)
+    return replace(experiment, steps=shorter, headings=headings, **arrays)
 
 
 def joined(days: Sequence[Experiment]) -> Experiment:

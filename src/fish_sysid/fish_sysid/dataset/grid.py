@@ -40,7 +40,7 @@ EARLY = 0.05  # steps by which a sample may come too early to stand alone at its
 TURNS = 0.1  # rad/s, more than a gyro's bias
 SPINS = 5.0  # rad/s of the rotor; strokes have tens and hundreds
 FIRST_POSES = 0.3  # s
-FEWEST_POSES = 3
+FEWEST_POSES = 3  # that tell how a fish moves
 # m in FIRST_POSES; at rest the recordings looked at have 14 mm at most, a fish at 0.1 m/s has 30
 GLIDES = 0.02
 
@@ -163,3 +163,13 @@ def _glide(t: Array, place: Array) -> float:
     """How far [m] a straight line through places (F, 2) at times t goes in FIRST_POSES."""
     velocity = np.polyfit(t - t.mean(), place, 1)[0]
     return FIRST_POSES * float(np.hypot(velocity[0], velocity[1]))
+
+
+def in_holes(known: NDArray[np.bool_], longest: int) -> NDArray[np.bool_]:
+    """Which grid points (T,) lie between known ones that are more than `longest` points apart.
+
+    So do those before the first and after the last of them, where these are more than that.
+    """
+    places = np.concatenate([[-1], np.flatnonzero(known), [len(known)]])
+    interval = np.searchsorted(places, np.arange(len(known)), side="right") - 1
+    return np.asarray((np.diff(places)[interval] > longest) & ~known)

@@ -19,8 +19,7 @@ from fish_sysid.diagnosis.significance import (
     simplest,
 )
 from fish_sysid.diagnosis.task import Task
-from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.noise_estimation import estimate_noise
+from fish_sysid.estimation.map_fit import Fit, estimate_noise, evaluate
 from fish_sysid.estimation.refit import refit
 from fish_sysid.estimation.thresholds import PLAUSIBLE
 

@@ -43,9 +43,7 @@ def missed_by(task: Task) -> float | None:
 
 def missed_with(effects: Iterable[str], robot: Robot, task: Task) -> float:
     """The same of a robot that has these effects free, and no other but its own."""
-    training, names = task.trials.training, tuple(effects)
+    training = task.trials.training
     if "camera_latency" not in robot.sensors:
         training = moved_back(training, align(training).delay)
-    for name in names:
-        robot = robot.without_effect(name)
-    return misfit(training, robot, usual_noise(training), NOMINAL_FREE, effects=names)
+    return misfit(training, robot, usual_noise(training), NOMINAL_FREE, effects=tuple(effects))

@@ -21,8 +21,7 @@ from fish_sysid.diagnosis.result import Diagnosis, State
 from fish_sysid.diagnosis.surrogate_model import STRUCTURAL, surrogate_model
 from fish_sysid.diagnosis.task import Task
 from fish_sysid.estimation.ekf_types import Array, Noise
-from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.noise_estimation import initial_noise
+from fish_sysid.estimation.map_fit import Fit, evaluate, initial_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
+from scipy import stats
 
 from fish_sim.robot import Robot
 from fish_sysid.diagnosis import latent_force
@@ -273,7 +273,7 @@ def mean_interval(gain: np.ndarray) -> list[float]:
     """
     if len(gain) < 2:
         return [float("nan")] * 2
-    half = float(student.isf(0.025, len(gain) - 1) * gain.std(ddof=1) / np.sqrt(len(gain)))
+    half = float(stats.t.isf(0.025, len(gain) - 1) * stats.sem(gain))
     return [float(gain.mean()) - half, float(gain.mean()) + half]
 
 

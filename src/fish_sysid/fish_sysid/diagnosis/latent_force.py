@@ -119,7 +119,7 @@ def time_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
 
 
 def place_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
-    """The cells of the pool's map with most of the missing force, in units of `scale` (3,)."""
+    """The cells of the pool's map with most of the missing force, in units of `scale` (3,); none where it acts beyond the map."""
     e, x, y = (
         a.ravel() for a in (energy(force, scale), force.covariates["x"], force.covariates["y"])
     )
@@ -129,6 +129,8 @@ def place_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
         np.linspace(-WIDTH / 2, WIDTH / 2, CELLS[1] + 1),
     ]
     total, _, _ = np.histogram2d(x[good], y[good], edges, weights=e[good])
+    if not total.any():
+        return []
     rows: list[dict[str, Any]] = [
         {
             "x": [float(edges[0][i]), float(edges[0][i + 1])],

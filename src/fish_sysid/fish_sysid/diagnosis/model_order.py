@@ -7,9 +7,7 @@ A tail that bends continuously, described by too few links, leaves a force that 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from fish_sim.robot import MAX_LINKS, Robot, nominal_parameters
+from fish_sim.robot import MAX_LINKS
 from fish_sysid.diagnosis.cross_validation import gain_unseen, on_all
 from fish_sysid.diagnosis.forward_selection import Selection
 from fish_sysid.diagnosis.residual_regression import Law, residual_law
@@ -19,19 +17,14 @@ from fish_sysid.estimation.map_fit import Fit, better
 from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.refit import ANNEAL, ANNEAL_HELD, ANNEAL_NEAR, multistart_fit, refit
+from fish_sysid.estimation.shooting.prediction_fit import with_links
 from fish_sysid.estimation.thresholds import (
     MORE_LINKS,
+    PROMISING_NOISE,
     PROMISING_RATIO,
     RATIO_SUSPECT,
     SMALLEST_CHECK,
 )
-
-
-def with_links(robot: Robot, links: int) -> Robot:
-    """The same fish with its tail cut into another number of equal links: totals and ratios to nominal values stay."""
-    old, new = nominal_parameters(robot.links), nominal_parameters(links)
-    values = {name: robot.parameters[name] * new[name].value / old[name].value for name in new}
-    return replace(robot, links=links, parameters=values)
 
 
 def better_order(selection: Selection, law: Law, task: Task) -> Fit | None:
@@ -97,9 +90,9 @@ def fit_links(links: int, nominal: Fit, best: Fit, task: Task) -> Fit:
 
 
 def promises_more(fit: Fit, best: Fit) -> bool:
-    """Whether a finer tail explains more than the best fit, or needs less than half of its process noise.
+    """Whether a finer tail explains more than the best fit, or is nearly right with less than half of its process noise.
 
-    Then one more link may be right even where this number is behind.
+    Then one more link may be right even where this number is behind. A tail that is far from right lacks more than a link.
     """
-    calmer = fit.largest_ratio < PROMISING_RATIO * best.largest_ratio
+    calmer = fit.largest_ratio < min(PROMISING_RATIO * best.largest_ratio, PROMISING_NOISE)
     return fit.log_posterior > best.log_posterior or calmer

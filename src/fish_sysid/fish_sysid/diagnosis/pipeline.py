@@ -57,7 +57,7 @@ def diagnose(
     task.progress("fitting the nominal model")
     nominal = fit_nominal(task)
     state = searched(nominal, task) if misses is None else unsearched(nominal, task)
-    settled = with_symmetry_found(state, symmetry, task)
+    settled = with_symmetry_found(state, of_training(symmetry, task), task)
     found = replace(conclude(state, settled, task), symmetry=symmetry, misses=misses)
     return by_predictions(found)
 
@@ -79,6 +79,13 @@ def unsearched(nominal: Fit, task: Task) -> State:
     """The nominal model alone, and the law that it leaves."""
     fit = refit_on(nominal, task.trials.training)
     return State((), (), fit, fit, residual_law(fit, task.trials.training))
+
+
+def of_training(symmetry: Sequence[SymmetryFinding], task: Task) -> list[SymmetryFinding]:
+    """What all trials show, in the numbers of the training trials where these show it too: held-out trials score the model."""
+    trained = symmetry_findings(task.trials.training, task.robot)
+    own = {f.name: f for f in trained if f.status == "found"}
+    return [own.get(f.name, f) if f.status == "found" else f for f in symmetry]
 
 
 def with_symmetry_found(

@@ -25,12 +25,12 @@ from fish_report.parallel import on_all_cores
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.result import Screened
 from fish_sysid.diagnosis.task import Task
-from fish_sysid.estimation.annealed_fit import Stages, anneal
 from fish_sysid.estimation.ekf import prepare
 from fish_sysid.estimation.ekf_types import Array, Noise
 from fish_sysid.estimation.map_fit import Fit, climb, evaluate, log_posterior
 from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import Hypothesis, extend
+from fish_sysid.estimation.refit import Stages, anneal
 from fish_sysid.estimation.thresholds import (
     POLISH_ITERATIONS,
     POLISHED,

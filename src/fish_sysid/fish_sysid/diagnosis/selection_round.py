@@ -15,19 +15,18 @@ from fish_sysid.diagnosis.result import Round, Screened
 from fish_sysid.diagnosis.screening import screen
 from fish_sysid.diagnosis.significance import look_alike
 from fish_sysid.diagnosis.task import Task, Trials
-from fish_sysid.estimation.map_fit import Fit, evaluate, log_posterior
-from fish_sysid.estimation.noise_estimation import estimate_noise, usual_noise
+from fish_sysid.estimation.map_fit import Fit, estimate_noise, evaluate, log_posterior
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.refit import (
     ANNEAL_SHORT_HELD,
-    CONTINUE,
     REFIT,
-    best_of_restart,
     refit,
 )
 from fish_sysid.estimation.thresholds import (
     ANNEALED_SHORTLIST,
     LARGE_EFFECT,
     MOST_RESTARTS,
+    NOISE_GAIN,
     POOR_BASE,
     RATIO_REJECT,
     SHORTLIST,
@@ -127,7 +126,12 @@ def refit_annealed(base: Fit, one: Screened, task: Task) -> Fit:
 
 
 def restart_base(base: Fit, rival: Fit, trials: Trials) -> Fit:
-    """The base, or the better optimum that a rival's nominal parameters lead to."""
+    """The base, or the better optimum that a rival's nominal parameters lead to.
+
+    It is sought on whole trials: shorter ones may lead both from the base and from there to one optimum, where whole trials hold
+    the base in another one.
+    """
     theta, noises = rival.theta[: len(base.theta)], (base.noise, rival.noise)
     noise = max(noises, key=lambda n: log_posterior(base.hypothesis, theta, trials.short, n))
-    return best_of_restart(base, theta, trials.searched, noise, CONTINUE)
+    other = refit(base.hypothesis, theta, trials.searched, noise)
+    return other if other.log_posterior - base.log_posterior > NOISE_GAIN else base

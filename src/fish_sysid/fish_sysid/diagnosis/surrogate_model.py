@@ -21,8 +21,9 @@ from fish_sysid.dataset.camera import AHEAD, MARKER, ahead_of, at_centre_of_mass
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.prediction_rivals import Named, with_rivals
 from fish_sysid.estimation.ekf_types import SensorModel
-from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.noise_estimation import initial_noise, usual_noise
+from fish_sysid.estimation.map_fit import Fit, evaluate, initial_noise
+from fish_sysid.estimation.noise_estimation import usual_noise
+from fish_sysid.estimation.parametrization import sensor_model
 from fish_sysid.estimation.shooting.prediction_fit import PLACE, PredictionFit, fit_predictions
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
 from fish_sysid.estimation.shooting.selection import INTRINSIC
@@ -51,11 +52,10 @@ def surrogate_model(
     report("no name fits: fitting predictions over seconds")
     robot = nominal.hypothesis.robot.without_effect("disturbance")
     free = [name for name in nominal.hypothesis.free if "." not in name]
-    sensors = nominal.hypothesis.parametrization.filter_inputs(nominal.theta)[2]
     moving = moving_effects(candidates, robot)
-    seen = without_sensor_errors(experiment, sensors)
+    seen = without_sensor_errors(experiment, nominal.robot)
     found = fit_predictions(seen, robot, free, (), moving, report, together=INTRINSIC)
-    fit = _as_fit(found, sensors, experiment)
+    fit = _as_fit(found, sensor_model(nominal.robot), experiment)
     own, other = (
         prediction_size(experiment, f.robot, f.noise) for f in (fit, _with_filter(nominal))
     )

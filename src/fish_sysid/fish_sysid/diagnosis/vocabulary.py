@@ -85,7 +85,7 @@ def not_excited(experiment: Experiment, effects: EffectTable = EFFECTS) -> dict[
     """Candidates that these recordings do not excite, with the reason."""
     reasons: dict[str, str] = {}
     if not np.isfinite(experiment.gyro).any():
-        reasons |= dict.fromkeys(("gyro_scale", "imu_misalignment"), "no IMU was recorded")
+        reasons |= dict.fromkeys(("gyro_scale", "imu_misalignment"), "no IMU sample can be used")
     rotor, rudder = experiment.given_commands.T
     if np.abs(rudder).max() < STILL:
         unseen = [name for name in effects if name.startswith("rudder_") and name not in SEEN_STILL]

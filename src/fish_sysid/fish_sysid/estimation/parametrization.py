@@ -169,7 +169,14 @@ def nominal_hypothesis(robot: Robot, free: tuple[str, ...] = NOMINAL_FREE) -> Hy
     return Hypothesis(robot.with_effect("disturbance"), moved)
 
 
-def zeros(robot: Robot) -> tuple[str, ...]:
+def sensor_model(robot: Robot) -> SensorModel:
+    """What the robot's sensor errors do to the truth, none of them free."""
+    own = robot.sensors.items()
+    values = {SENSOR_FIELDS[k]: next(iter(v.values())) for k, v in own if k in SENSOR_FIELDS}
+    return SensorModel(**values, free={}, slope={})
+
+
+def left_at_zero(robot: Robot) -> tuple[str, ...]:
     """Parameters of a nominal model that would be free if they were not 0 in this robot."""
     return tuple(name for name in NOMINAL_FREE if robot.parameters[name] == 0.0)
 
@@ -262,13 +269,8 @@ class Parametrization:
                 dp[j, index[name]] = slope[j]
             else:
                 sensor_free[SENSOR_FIELDS[name.split(".")[0]]] = j
-        values = {
-            SENSOR_FIELDS[k]: next(iter(v.values()))
-            for k, v in robot.sensors.items()
-            if k in SENSOR_FIELDS
-        }
         slopes = {field: float(slope[j]) for field, j in sensor_free.items()}
-        return p, dp, SensorModel(**values, free=sensor_free, slope=slopes)
+        return p, dp, replace(sensor_model(robot), free=sensor_free, slope=slopes)
 
     def read(self, robot: Robot) -> Array:
         """Physical values of the free parameters in a robot of this structure."""

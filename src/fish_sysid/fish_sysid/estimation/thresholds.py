@@ -87,8 +87,8 @@ STILL = 1e-3  # rad, rad/s; a command that varies less excites nothing
 
 # --- number of links -----------------------------------------------------------------------------
 MORE_LINKS = (1, 2)  # beyond the robot's, that are tried
-# of the best fit's process noise; with less the next number of links is tried
-PROMISING_RATIO = 0.5
+# of the best fit's process noise, and times that of usual water; with less than both the next number of links is tried
+PROMISING_RATIO, PROMISING_NOISE = 0.5, 10.0
 
 # --- cross-validation and residual regression ------------------------------------------------------
 MOST_ITERATIONS, NEAR_GAIN = 20, 1.0  # to the optimum of all trials, far for a flow; nats

@@ -24,7 +24,7 @@ from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.noise_estimation import initial_noise
+from fish_sysid.estimation.map_fit import initial_noise
 from fish_sysid.prediction.prediction import (
     EVERY,
     HORIZONS,

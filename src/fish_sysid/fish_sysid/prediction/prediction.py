@@ -23,7 +23,7 @@ from fish_sysid.dataset.grid import in_base_link
 from fish_sysid.dataset.imu import imu_moved_back
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import WRENCH, Noise, SensorModel
-from fish_sysid.estimation.parametrization import nominal_hypothesis
+from fish_sysid.estimation.parametrization import nominal_hypothesis, sensor_model
 from fish_sysid.estimation.shooting.start_states import shot_states, without_sensor_errors
 from fish_sysid.estimation.smoother import smoothed
 from fish_sysid.prediction.kept_noise import kept_trust, uses_shooting
@@ -36,6 +36,7 @@ WARM_UP = 2.0  # s, until the filter has settled; no start point for errors befo
 EVERY = 1.0  # s, between start points for errors
 TRIALS_AT_ONCE = 4  # in the filter, whose history is large
 SHORTEST_PIECE = 10  # steps until a filter that diverged at once is begun anew
+LONGEST = 600.0  # s, a horizon; all steps of all predictions are held in memory
 CHUNK = 10  # steps with a constant wrench, while it decays
 
 
@@ -173,18 +174,17 @@ def predict(
 
     The robot is the whole model: its effects and sensor errors count. The wrench of the estimate dies away with the
     noise's time constant. ahead: s of measurements after each start point that its state may know; 0: a prediction in
-    earnest. Raises ValueError when horizon or every is no positive number of seconds.
+    earnest. Raises ValueError when horizon or every is shorter than the grid, or the horizon longer than LONGEST.
     """
     every = horizon if every is None else every
-    if not (np.isfinite(horizon) and horizon >= DT and every >= DT):
+    if not (DT <= horizon <= LONGEST and every >= DT):
         raise ValueError(
-            f"horizon {horizon} s, start points every {every} s: expected at least {DT} s"
+            f"horizon {horizon} s, start points every {every} s: expected {DT} to {LONGEST:g} s"
         )
     experiment = imu_moved_back(experiment, robot.sensors.get("imu_latency", {}).get("delay", 0.0))
     estimates, ahead_m = estimate(experiment, robot, noise), ahead_of(robot)
     starts = start_points(experiment, every, first)
     trial, start = starts[:, 0], starts[:, 1]
-    sensors = nominal_hypothesis(robot, free=()).parametrization.filter_inputs(np.zeros(0))[2]
     length = int(np.ceil((horizon + HALF_WINDOW) / DT)) + 1
     state, wrench = estimates.state[start, trial], estimates.wrench[start, trial]
     if ahead and len(starts):
@@ -194,12 +194,12 @@ def predict(
         good = np.isfinite(known).all(axis=1)
         state[good, :nx], wrench[good] = known[good, :nx], known[good, nx : nx + 3]
     if uses_shooting(robot) and len(starts):
-        seen = at_centre_of_mass(without_sensor_errors(experiment, sensors), ahead_m)
+        seen = at_centre_of_mass(without_sensor_errors(experiment, robot), ahead_m)
         shot = shot_states(seen, robot, starts, trust=kept_trust(robot), ahead=ahead)
         good = np.isfinite(shot).all(axis=1)
         state[good], wrench[good] = shot[good], 0.0
     pose = _simulate(experiment, robot, noise, starts, state, wrench, length)
-    return Predictions(estimates, sensors, trial, start, pose, horizon, ahead_m)
+    return Predictions(estimates, sensor_model(robot), trial, start, pose, horizon, ahead_m)
 
 
 def start_points(experiment: Experiment, every: float, first: float) -> NDArray[np.int64]:

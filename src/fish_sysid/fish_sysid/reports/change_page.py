@@ -18,7 +18,8 @@ from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.read import heading
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import changed_robot
-from fish_sysid.estimation.noise_estimation import initial_noise, usual_noise
+from fish_sysid.estimation.map_fit import initial_noise
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.prediction.kept_noise import kept_noise
 from fish_sysid.prediction.prediction import predict
 from fish_sysid.prediction.stroke_average import stroke_mean

@@ -78,8 +78,8 @@ def _label(name: str) -> str:
     return NAMES.get(plain, plain) + (f", with {PEEK:g} s of what comes" if plain != name else "")
 
 
-def _cell(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.3g}"
+def _cell(value: float, digits: int = 3) -> str:
+    return "" if np.isnan(value) else f"{value:.{digits}g}"
 
 
 def parameter_table(result: Identification) -> Table:
@@ -96,7 +96,7 @@ def parameter_table(result: Identification) -> Table:
         remark = "not determined by these data" if name in unknown else ""
         relative = f"{100 * error / abs(value):.2g} %" if value else ""
         row = [name, f"{value:.5g}", f"{error:.2g}", unit, ratio, relative, remark]
-        rows.append([*row[:3], *([f"{spread[name]:.2g}"] if spread else []), *row[3:]])
+        rows.append([*row[:3], *([_cell(spread[name], 2)] if spread else []), *row[3:]])
     header = ["parameter", "value", "standard error", "unit", "over start", "relative error", ""]
     note = "Standard errors from the likelihood's curvature, to first order."
     if spread:

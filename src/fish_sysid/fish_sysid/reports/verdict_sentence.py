@@ -31,6 +31,9 @@ def sentence(content: Content) -> str:
         parts.append(
             "model.yaml is the refitted nominal model: nothing that was found predicts held-out positions better."
         )
+    alone = [e["name"] for e in content["effects"] if by_symmetry(e)]
+    if content["fit"].get("written") == "with_effects" and alone:
+        parts.append(f"model.yaml is without {' and '.join(alone)}, which no fit of a model shows.")
     return " ".join(parts)
 
 
@@ -50,7 +53,7 @@ def _verdict(content: Content) -> str:
         return f"{content['verdict']}: the model lacks {' and '.join(_effect(e) for e in found)}."
     if content["verdict"] == "unexplained":
         nearest = ", ".join(content["unexplained"]["nearest"])
-        aside = f" Without explaining the most of it, {nearest} would help." if nearest else ""
+        aside = f" Without explaining most of it, {nearest} would help." if nearest else ""
         return (
             f"unexplained: {content['unexplained']['description']}.{aside}{_by_prediction(content)}"
         )

@@ -16,6 +16,8 @@ from fish_sim.robot_argument import read_model
 from fish_sim.robot_file import save_robot
 from fish_sysid.dataset.read import line, read_days, read_experiment
 
+FILES = ("diagnosis.json", "model.yaml", "report.html")
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
@@ -73,8 +75,9 @@ def run(args: argparse.Namespace) -> int:
     with user_errors():
         level = Level() if args.false_alarms is None else Level(args.false_alarms)
         names = known(args.candidates.split(",")) if args.candidates else None
+        without = left_out_stages(args.without)
     experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
-    writable_folder(args.out)
+    writable_folder(args.out, names=FILES, inputs=(args.robot, args.topics))
     with console.status("diagnosing") as status:
 
         def progress(text: str) -> None:
@@ -84,9 +87,7 @@ def run(args: argparse.Namespace) -> int:
                 say(console, line)
 
         try:
-            result = diagnose(
-                experiment, robot, level, progress, names, without=left_out_stages(args.without)
-            )
+            result = diagnose(experiment, robot, level, progress, names, without=without)
         except NoCandidateError as error:
             raise UserError(str(error)) from error
         content = {**answer(result), "left_out": left_out, "stages": sorted(result.task.acted)}
@@ -101,10 +102,9 @@ def run(args: argparse.Namespace) -> int:
     write_diagnosis_page(
         args.out / "report.html", named_path(args.dataset[0]).name, content, result
     )
-    files = f"{args.out}/diagnosis.json, model.yaml, report.html"
     for text in [*map(line, left_out), sentence(content)]:
         say(terminal(), text, PARAGRAPH)
-    say(terminal(), f"{files} ({time.monotonic() - start:.0f} s)")
+    say(terminal(), f"{args.out}/{', '.join(FILES)} ({time.monotonic() - start:.0f} s)")
     return 0
 
 
@@ -124,7 +124,7 @@ def _compare(args: argparse.Namespace) -> int:
             )
     robot = read_model(args.robot)
     new, olds, left_out, unlike = read_days(args.dataset, args.baseline, topic_map(args))
-    writable_folder(args.out)
+    writable_folder(args.out, names=FILES, inputs=(args.robot, args.topics))
 
     def progress(text: str) -> None:
         say(console, f"{time.monotonic() - start:5.0f} s  {text}")
@@ -138,7 +138,11 @@ def _compare(args: argparse.Namespace) -> int:
     content["left_out"] = [*left_out, *content["left_out"]]
     write_json(args.out / "diagnosis.json", content)
     written = "diagnosis.json, report.html"
-    if change.robot is not None:
+    if change.robot is None:  # a model of an earlier comparison says what this one does not
+        if (older := args.out / "model.yaml").exists():
+            older.unlink()
+            written += "; model.yaml of an earlier run is removed"
+    else:
         save_robot(changed_robot(change), args.out / "model.yaml", notes=sentence(change))
         written = "diagnosis.json, model.yaml, report.html"
     write_change_page(args.out / "report.html", named_path(args.dataset[0]).name, content, change)
@@ -149,5 +153,12 @@ def _compare(args: argparse.Namespace) -> int:
 
 
 def left_out_stages(given: str | None) -> frozenset[str]:
-    """The stages that --without names, separated by commas."""
-    return frozenset(given.split(",")) if given else frozenset()
+    """The stages that --without names, separated by commas; raises UserError for an unknown one."""
+    from fish_sysid.diagnosis.task import STAGE_NAMES
+
+    stages = frozenset(given.split(",")) if given else frozenset()
+    if unknown := sorted(stages - STAGE_NAMES):
+        raise UserError(
+            f"--without: got {', '.join(unknown)}; expected stages of the search: {', '.join(sorted(STAGE_NAMES))}"
+        )
+    return stages

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
     console, robot = terminal(), read_model(args.robot)
     with user_errors():
-        writable_file(args.out)
+        writable_file(args.out, inputs=(args.program, args.robot))
         if args.program is None:
             swims = swims_of_every_kind(robot)
         else:

@@ -20,6 +20,8 @@ from fish_report.terminal import PARAGRAPH, plain, say, terminal
 from fish_sim.robot_argument import read_model
 from fish_sysid.dataset.read import line, read_experiment
 
+FILES = ("robot.yaml", "identification.json", "report.html")
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the verb."""
@@ -66,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
         effects = () if chosen else known([name for name in args.effects.split(",") if name])
     robot = read_model(args.robot)
     experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
-    writable_folder(args.out)
+    writable_folder(args.out, names=FILES, inputs=(args.robot, args.topics))
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar, user_errors():
         task, began = bar.add_task("identifying", total=None), time.monotonic()
@@ -90,6 +92,6 @@ def run(args: argparse.Namespace) -> int:
     print_table(console, error_table(result.errors))
     for text in [*map(line, left_out), *result.statements]:
         say(console, f"- {text}", PARAGRAPH)
-    files = "robot.yaml, identification.json and report.html"
+    files = f"{', '.join(FILES[:-1])} and {FILES[-1]}"
     say(console, f"{result.seconds:.0f} s; {files} in {args.out}")
     return 0

@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
     console = terminal()
     with user_errors():
-        writable_file(args.out)
+        writable_file(args.out, inputs=(args.robot,))
         plan = plan_calibration(
             read_model(args.robot),
             sensor_set(args),

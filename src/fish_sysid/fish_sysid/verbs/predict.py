@@ -13,8 +13,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from fish_bag.recording_files import files_under
 from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_report.errors import user_errors
+from fish_report.files import writable_file
 from fish_report.terminal import say, terminal
 from fish_sim.robot_argument import read_model
 from fish_sysid.dataset.read import line, read_experiment
@@ -36,12 +38,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the table, print the errors."""
     from fish_report.terminal import print_table
-    from fish_sysid.estimation.noise_estimation import initial_noise, usual_noise
+    from fish_sysid.estimation.map_fit import initial_noise
+    from fish_sysid.estimation.noise_estimation import usual_noise
     from fish_sysid.prediction.kept_noise import kept_noise
     from fish_sysid.prediction.prediction import WARM_UP, predict, prediction_errors
     from fish_sysid.reports.identify_tables import error_table, write_predictions
 
     console = terminal()
+    writable_file(args.out, inputs=(*files_under(args.recording), args.model, args.topics))
     model = read_model(args.model)
     experiment, left_out = read_experiment(args.recording, topics=topic_map(args))
     with user_errors():

@@ -157,7 +157,8 @@ def _sloshing(swim: Swim, frequency: float) -> Array:
 
 def _camera_latency(swim: Swim) -> Array:
     u, v, r = typical("camera_latency", "delay") * swim.aged.T
-    centres = np.column_stack([u, v, np.zeros_like(u), r])
+    # the yaw rate is the gyro's, or the camera's without one
+    centres = np.column_stack([u, v, np.where(np.isfinite(swim.means.gyro), 0.0, r), r])
     windows = np.column_stack(
         [-typical("camera_latency", "delay") * swim.windows[:, 1], np.zeros(len(swim.windows))]
     )

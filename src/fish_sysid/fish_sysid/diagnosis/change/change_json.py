@@ -72,7 +72,7 @@ def verdict(change: Change) -> str:
 
 def chance(p_value: float) -> str:
     """A p-value in words; a few hundred exchanges with the tail of their null say no more than that it is below 0.001."""
-    return f"p = {p_value:.2g}" if p_value >= LEAST_SAID else f"p < {LEAST_SAID}"
+    return f"p < {LEAST_SAID}" if p_value < LEAST_SAID else f"p = {p_value:.2g}"
 
 
 def sentence(change: Change) -> str:

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 FEWEST_OLD, FEWEST_NEW = 6, 3  # trials
 FEWEST_WAYS = 100  # in which NEW's number of trials is chosen of all; with fewer nothing is rare at the level of 1 %
-SENSORS = (("gyro", "a gyro"), ("accel", "an accelerometer"), ("encoder", "an encoder"))
+SENSORS = (("gyro", "a gyro"), ("accel", "an accelerometer"))
 UNITS = 8.0  # ratio of sizes that no change of a fish makes: degrees to radians are 57, millimetres to metres 1000
 NEAR = 0.5  # of a command's spread: commands within it are alike
 COMMON = 0.5  # share of NEW's stroke means with an OLD one nearby
@@ -39,7 +39,7 @@ class NotComparableError(ValueError):
 
 def check_sensors(old: Experiment, new: Experiment) -> None:
     """Raises NotComparableError where a sensor is missing in one of them, or its numbers are of another unit."""
-    for key, text in SENSORS[:2]:
+    for key, text in SENSORS:
         has = [bool(np.isfinite(getattr(e, key)).any()) for e in (old, new)]
         if has[0] != has[1]:
             with_it, without = ("OLD", "NEW") if has[0] else ("NEW", "OLD")

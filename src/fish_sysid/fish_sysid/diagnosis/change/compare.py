@@ -86,7 +86,7 @@ def _compare(
     delay = aligned.delay if np.isfinite(aligned.rms) else given
     report("testing symmetries of OLD")
     symmetry = symmetry_findings(old, robot)
-    age = age_change(old, new)
+    age = age_change(old, new, days_of(olds, old.names, len(new.names)))
     age = age if age is not None and age.p_value <= LEVEL else None
     later = 0.0 if age is None else age.later
     old, new = moved_back(old, delay), moved_back(new, delay + later)
@@ -96,13 +96,13 @@ def _compare(
     report("the rudder's answer")
     strata = kinds(old_days, new_days)
     old, new = _of(old, old_days), _of(new, new_days)
-    answer = rudder_change(old, new, strata)
+    day_of = days_of(olds, old.names, len(new.names))
+    answer = rudder_change(old, new, strata, day_of)
     servo = answer if answer is not None and answer.p_value <= LEVEL else None
     passed = new
     if servo is not None:
         passed, new_days = _as_passed_on(new, new_days, servo)
     report("what each candidate would change")
-    day_of = days_of(olds, [s.name for s in old_days], len(new_days))
     looks = _looks(robot, (old, old_days), (passed, new_days), strata, day_of)
     strange = {
         trial: None

@@ -96,7 +96,9 @@ def next_change(
             as_found = replace(values, by_trial=one.by_trial)
             impossible.append(Contender(one, as_found, 0.0, rarity))
         elif values.by_trial.mean() > 0.0:
-            left = swap_test(case.fit, case.strata, FEW_SWAPS, taken=(*taken, one.key))
+            left = swap_test(
+                case.fit, case.strata, FEW_SWAPS, taken=(*taken, one.key), days=case.day_of
+            )
             found.append(Contender(one, values, left.p_value, rarity))
     if not found:
         return family_alone(swapped, judged)

@@ -153,10 +153,13 @@ def merged(named: Sequence[Named], one: Named) -> list[Named]:
 
 
 def exact_age(old: Experiment | None, new: Experiment, one: Named) -> tuple[float, Named]:
-    """How much older NEW's images are than OLD's, by camera and gyro, and the change with that number."""
+    """How much older NEW's images are than OLD's, by camera and gyro, and the change with that number.
+
+    Where camera and gyro do not tell both ages, the change keeps its own number.
+    """
     first = one.members[0]
     (before, error), (after, own) = (0.0, 0.0) if old is None else fine_delay(old), fine_delay(new)
-    if not (np.isfinite(before) and after > 0.0):
+    if not (np.isfinite([before, error, own]).all() and after > 0.0):
         return first.refitted.parameters["delay"].value, one
     age = Estimate(after - before, float(np.hypot(error, own)), "s")
     values = replace(first.refitted, parameters={"delay": age})

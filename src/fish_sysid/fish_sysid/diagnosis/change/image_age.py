@@ -9,6 +9,7 @@ in its place, as in `permutation_test`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from fish_sysid.dataset.camera import DELAYS, STEP, align, fine_delay, misfits
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.change import Member, Named
-from fish_sysid.diagnosis.change.permutation_test import SETS, rank, sets_in_place
+from fish_sysid.diagnosis.change.permutation_test import p_value_of
 from fish_sysid.diagnosis.change.strength import Refitted
 from fish_sysid.diagnosis.symmetry.finding import Estimate
 
@@ -36,8 +37,11 @@ class AgeChange:
     later: float  # s, how much older NEW's images are than OLD's
 
 
-def age_change(old: Experiment, new: Experiment) -> AgeChange | None:
-    """A change of the images' age beyond FAR; None where there is none or the gyro cannot tell."""
+def age_change(old: Experiment, new: Experiment, days: Sequence[int] = ()) -> AgeChange | None:
+    """A change of the images' age beyond FAR; None where there is none or the gyro cannot tell.
+
+    days (M,): of several days of OLD the number of each trial's day, OLD's trials first.
+    """
     if not abs(align(new).delay - align(old).delay) > FAR:
         return None
     (before, error), (of_new, own) = fine_delay(old), fine_delay(new)
@@ -45,9 +49,10 @@ def age_change(old: Experiment, new: Experiment) -> AgeChange | None:
         return None
     squares = np.concatenate([misfits(old)[0], misfits(new)[0]])
     first, trials = len(old.names), len(squares)
-    sets = sets_in_place([1] * trials, np.arange(first, trials), np.random.default_rng(0), SETS)
     ages = _ages(squares)
-    p_value = float(rank(np.array([_apart(ages, rows) for rows in sets]))[0])
+    p_value = p_value_of(
+        lambda rows: _apart(ages, rows), [1] * trials, np.arange(first, trials), days
+    )
     gains = _gains(squares[first:], before, of_new)
     change = Estimate(of_new - before, float(np.hypot(error, own)), "s")
     member = Member(NAME, 1.0, np.nan, Refitted({"delay": change}, "", gains))

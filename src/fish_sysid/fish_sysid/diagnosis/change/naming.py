@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.stats import norm, sem
+from scipy.stats import t as student
 
 from fish_sysid.diagnosis.change.shared_fit import CHANGE, Key, Regression
 from fish_sysid.diagnosis.change.swap_test import Gains
@@ -17,18 +18,21 @@ from fish_sysid.diagnosis.change.swap_test import Gains
 Array = NDArray[np.float64]
 
 
-# standard errors by which one contender predicts left-out trials better than another
-SEPARATE = 2.0
+# probability that chance lets a contender lead by more than one that predicts clearly better: two normal standard errors
+SEPARATE = float(norm.sf(2.0))
 
 
 def apart(best: Array, other: Array) -> bool:
-    """Whether the best predicts left-out trials clearly better: nats (M,) on each."""
-    return _lead(best, other) > SEPARATE
+    """Whether the best predicts left-out trials clearly better: nats (M,) on each, Student's t as in `tie`."""
+    return _lead(best, other) > float(student.isf(SEPARATE, len(best) - 1))
 
 
 def tie(best: Array, other: Array) -> float:
-    """Weight of a contender against the best one by nats (M,): 1 for equal gains, small for one that predicts worse."""
-    return float(2.0 * norm.sf(max(_lead(best, other), 0.0)))
+    """Weight of a contender against the best one by nats (M,): 1 for equal gains, small for one that predicts worse.
+
+    The two-sided probability of the lead by Student's t with M - 1 degrees of freedom, as M trials say how far trials differ.
+    """
+    return float(2.0 * student.sf(max(_lead(best, other), 0.0), len(best) - 1))
 
 
 def _lead(best: Array, other: Array) -> float:
@@ -39,7 +43,7 @@ def _lead(best: Array, other: Array) -> float:
 
 def mean_gain(gains: Array) -> tuple[float, float]:
     """Mean of (M,) and its standard error."""
-    return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains)))
+    return float(gains.mean()), float(sem(gains))
 
 
 # a name whose special case explains as much is not needed

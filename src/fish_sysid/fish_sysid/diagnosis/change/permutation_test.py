@@ -14,7 +14,7 @@ of the images.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from fish_sysid.diagnosis.change.swap_test import (
     Index,
     drawn,
     most_shared,
-    single_days,
+    share_of_days,
 )
 
 Array = NDArray[np.float64]
@@ -54,14 +54,31 @@ def permutation_p_value(
     most, trials = most_shared(strata, new), len(looks[0].names)
     gains = _named_gains(looks, sets)
     of_sets = largest(gains, gains, shared(sets, sets, trials) > most)
-    p_value = float(rank(of_sets)[0])
-    some_days = single_days(days, looks[0].old)
-    if not some_days:
-        return p_value
-    common = shared(some_days, sets, trials)  # a large day shares many with every set
-    near = common > np.maximum(most, common.mean(axis=1, keepdims=True))
-    of_days = largest(_named_gains(looks, some_days), gains, near)
-    return max(p_value, float((of_days >= of_sets[0]).mean()))
+
+    def of_days(some: Sequence[Index]) -> Array:
+        common = shared(some, sets, trials)  # a large day shares many with every set
+        near = common > np.maximum(most, common.mean(axis=1, keepdims=True))
+        return largest(_named_gains(looks, some), gains, near)
+
+    share = share_of_days(of_days, days, looks[0].old, of_sets[0])
+    return max(float(rank(of_sets)[0]), share)
+
+
+def p_value_of(
+    statistic: Callable[[Index], float],
+    strata: Sequence[int],
+    new: Index,
+    days: Sequence[int] = (),
+    count: int = SETS,
+) -> float:
+    """The p-value of one number of a set of trials: NEW's rank among sets in its place, and at least `share_of_days`."""
+    sets = sets_in_place(strata, new, np.random.default_rng(0), count)
+
+    def of(some: Sequence[Index]) -> Array:
+        return np.array([statistic(rows) for rows in some])
+
+    of_sets = of(sets)
+    return max(float(rank(of_sets)[0]), share_of_days(of, days, int(new[0]), of_sets[0]))
 
 
 def sets_in_place(

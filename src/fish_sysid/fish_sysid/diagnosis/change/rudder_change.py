@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.change import Member, Named
+from fish_sysid.diagnosis.change.comparable import FEWEST_NEW, FEWEST_OLD
 from fish_sysid.diagnosis.change.naming import apart, tie
-from fish_sysid.diagnosis.change.permutation_test import SETS, rank, sets_in_place
+from fish_sysid.diagnosis.change.permutation_test import SETS, p_value_of
 from fish_sysid.diagnosis.change.servos import ANSWERED, SERVOS, lagged
 from fish_sysid.diagnosis.change.strength import Refitted
 from fish_sysid.diagnosis.change.swap_test import Index
@@ -31,7 +32,7 @@ from fish_sysid.diagnosis.symmetry.regression import jackknife
 Array = NDArray[np.float64]
 
 
-STEP, MEMORY = 2, 30  # grid points between samples, samples of past: 0.6 s
+STEP, MEMORY = 2, 30  # least grid points between samples, samples of past: 0.6 s
 RIDGE = 1e-3  # of the columns' mean square
 WARM_UP = 1.5  # s, after which the start is forgotten
 SMOOTH = 0.5  # s, over which the rotor's power is taken
@@ -59,18 +60,27 @@ class StepResponse:
 
 
 def step_response(
-    old: Experiment, new: Experiment, strata: Sequence[int], count: int = SETS
+    old: Experiment,
+    new: Experiment,
+    strata: Sequence[int],
+    count: int = SETS,
+    days: Sequence[int] = (),
 ) -> StepResponse | None:
-    """The answer; None where a trial's gyro or rudder says too little. strata (M,): OLD's trials first, then NEW's."""
+    """The answer by the trials whose gyro says enough; None where OLD or NEW has too few of them.
+
+    strata (M,): OLD's trials first, then NEW's; days (M,): of several days of OLD the number of each trial's day.
+    """
     parts = [_Trial.of(e, m) for e in (old, new) for m in range(len(e.names))]
-    trials = [part for part in parts if part is not None]
-    if len(trials) < len(parts):
+    found = {i: part for i, part in enumerate(parts) if part is not None}
+    first = sum(i < len(old.names) for i in found)
+    if first < FEWEST_OLD or len(found) - first < FEWEST_NEW:
         return None
-    rows = np.arange(len(old.names), len(trials))
+    trials, strata = list(found.values()), [strata[i] for i in found]
+    days = [days[i] for i in found] if days else ()
+    rows = np.arange(first, len(trials))
     observed = _judged(trials, rows)
     pooled = _Pooled.of(trials)
-    sets = sets_in_place(strata, rows, np.random.default_rng(0), count)
-    p = float(rank(np.array([pooled.gain(some) for some in sets]))[0])
+    p = p_value_of(pooled.gain, strata, rows, days, count)
     answers = [
         Answered(name, gains, _estimate(name, losses)) for name, (gains, losses) in observed.items()
     ]
@@ -91,8 +101,8 @@ class _Trial:
         steps = int(experiment.steps[m])
         rotor, rudder = experiment.commands[:steps, m].T
         gyro = experiment.gyro[:steps, m]
-        at = np.arange(max(round(WARM_UP / DT), STEP * MEMORY), steps, STEP)
-        at = at[np.isfinite(gyro[at])]
+        at = np.arange(max(round(WARM_UP / DT), STEP * MEMORY), steps)
+        at = _spaced(at[np.isfinite(gyro[at])])
         if len(at) < 2 * MEMORY:
             return None
         power = np.sqrt(lagged(rotor**2, SMOOTH))
@@ -138,6 +148,15 @@ class _Pooled:
         b = np.linalg.solve(G + ridge[:, :, None] * np.eye(G.shape[1]), h[..., None])[..., 0]
         left = len(self.gram) - 2.0 * np.sum(b * h, axis=1) + np.einsum("sp,spq,sq->s", b, G, b)
         return float((left[0] - left.min()) / left.min())
+
+
+def _spaced(at: Index) -> Index:
+    """Of grid points (N,) in their order the first, and each that is STEP or more beyond the one before."""
+    kept: list[int] = []
+    for k in at.tolist():
+        if not kept or k >= kept[-1] + STEP:
+            kept.append(k)
+    return np.array(kept, dtype=np.int64)
 
 
 def _past(signals: Sequence[Array], at: NDArray[np.int64]) -> Array:
@@ -197,9 +216,11 @@ class RudderChange:
     named: Named
 
 
-def rudder_change(old: Experiment, new: Experiment, strata: Sequence[int]) -> RudderChange | None:
+def rudder_change(
+    old: Experiment, new: Experiment, strata: Sequence[int], days: Sequence[int] = ()
+) -> RudderChange | None:
     """The servo that NEW's gyro asks for, and those that do about as well; None where no servo does better than none."""
-    answer = step_response(old, new, strata)
+    answer = step_response(old, new, strata, days=days)
     if answer is None:
         return None
     real = [
@@ -229,11 +250,11 @@ def with_second_opinion(named: Sequence[Named], servo: RudderChange | None) -> l
 
 
 def _both(by_motion: Named, by_gyro: Named) -> Named:
-    """One change with the members of both; where both have one, its numbers are those by the gyro."""
+    """One change with the members of both and the gain of the best; where both have one, its numbers are those by the gyro."""
     found: dict[str, Member] = {}
     for member in (*by_gyro.members, *by_motion.members):
         had = found.get(member.name, replace(member, probability=0.0))
         share = 0.5 * member.probability + had.probability
         found[member.name] = replace(had, probability=share)
     members = sorted(found.values(), key=lambda m: -m.probability)
-    return replace(by_motion, members=tuple(members))
+    return Named.of(tuple(members))

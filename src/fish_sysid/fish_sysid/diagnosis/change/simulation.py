@@ -20,7 +20,14 @@ from fish_sim.robot import Robot
 from fish_sim.step import Stepper
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.grid import in_base_link
-from fish_sysid.diagnosis.change.channels import AT_CENTRES, MEANS, StrokeWeights, Swim, parts
+from fish_sysid.diagnosis.change.channels import (
+    AT_CENTRES,
+    HALF_WIDTH,
+    MEANS,
+    StrokeWeights,
+    Swim,
+    parts,
+)
 from fish_sysid.estimation.ekf import filter_stepper
 from fish_sysid.prediction.stroke_average import stroke_mean
 
@@ -89,6 +96,7 @@ def _pass(
 def rollout(stepper: Stepper, table: Array, commands: Array) -> tuple[Array, Array]:
     """States (T + 1, B, NS) of fish that start at rest, and where they say nothing (T + 1, B) after a restart from rest.
 
+    Nothing is said either of what MOST_RESTARTS leave diverged, from the first window of an amplitude on that reaches it.
     table (B, P): their parameters; commands (T, B, 2).
     """
     rest = np.array([stepper.rest((0.0, 0.0, 0.0), parameters=row) for row in table])
@@ -103,7 +111,10 @@ def rollout(stepper: Stepper, table: Array, commands: Array) -> tuple[Array, Arr
             again = stepper.rollout(rest[[lane]], commands[k:, [lane]], table[[lane]])
             x[k:, lane] = again[:, 0]
         if not gone.any():
-            break
+            return x, lost
+    left: NDArray[np.bool_] = np.asarray(~np.isfinite(x[:-1]).all(axis=2))
+    for lane in np.flatnonzero(left.any(axis=0)):
+        lost[max(int(left[:, lane].argmax()) - round(HALF_WIDTH / DT), 0) :, lane] = True
     return x, lost
 
 

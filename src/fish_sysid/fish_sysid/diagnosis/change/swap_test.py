@@ -18,7 +18,7 @@ One standard error of gamma is added, gamma / sqrt(k), as the exchanged sets sha
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,8 +120,7 @@ def swap_test(
     of_null, of_new = rarest(null), float(rarest(observed)[0])
     counted = (1.0 + float((of_null >= of_new).sum())) / (1.0 + len(of_null))
     p = min(counted, tail_probability(of_null, of_new))
-    some_days = single_days(days, fit.old)
-    share = float((rarest(gains.of(some_days)) >= of_new).mean()) if some_days else 0.0
+    share = share_of_days(lambda some: rarest(gains.of(some)), days, fit.old, of_new)
     rarity = -np.log(tails.probability(observed)[0])
     return Swapped(
         max(p, share),
@@ -180,6 +179,18 @@ def single_days(days: Sequence[int], old: int) -> list[Index]:
     of_old = np.asarray(days, dtype=np.int64)[:old]
     found = [np.flatnonzero(of_old == day) for day in np.unique(of_old)]
     return found if len(found) > 1 else []
+
+
+def share_of_days(
+    statistic: Callable[[Sequence[Index]], Array], days: Sequence[int], old: int, of_new: float
+) -> float:
+    """Share of OLD's single days that look as changed as NEW does; 0 where OLD is one day.
+
+    statistic: (sets,) of sets of trials that stand for NEW; of_new: that of NEW itself. A change is larger than that from any
+    of these days to the others, so that this share is the least that its p-value is.
+    """
+    some_days = single_days(days, old)
+    return float((statistic(some_days) >= of_new).mean()) if some_days else 0.0
 
 
 class Gains:

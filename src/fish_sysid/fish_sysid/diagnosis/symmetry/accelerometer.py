@@ -20,7 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
+from fish_sysid.dataset.camera import HOLE as PAUSE
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.grid import in_holes
+from fish_sysid.dataset.imu import HOLE
 from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding, SymmetryTest
 from fish_sysid.diagnosis.symmetry.regression import Judged, Rows, judge, least_squares
 from fish_sysid.estimation.thresholds import (
@@ -40,6 +43,7 @@ HALF_WINDOW = 1.0  # s; two strokes
 STEP = 0.45  # s between windows; not whole strokes, as in `stroke_means`
 LEAST_FRAMES = 15  # in a window
 AGREE = 3.0  # standard errors
+COVERED = 0.5  # of a trial, that lies between samples of the IMU that are HOLE apart or less
 LARGEST_SPREAD = 0.1  # rad, rms of the camera's heading less the gyro's integral in a trial
 
 CAMERA_SCALE = SymmetryTest(
@@ -59,10 +63,13 @@ IMU_AXES = SymmetryTest(
 def accelerations(experiment: Experiment) -> tuple[SymmetryFinding, SymmetryFinding]:
     """The tests for `camera_scale` and `imu_misalignment`."""
     if not (np.isfinite(experiment.gyro).any() and np.isfinite(experiment.accel).any()):
-        return _both("no IMU was recorded")
+        return _both("no IMU sample can be used")
     made = [r for m in range(len(experiment.names)) if (r := _rows(experiment, m)) is not None]
     if len(made) < FEWEST_TRIALS:
-        return _both("fewer than three trials in which gyro, accelerometer and camera go together")
+        return _both(
+            "fewer than three trials in which gyro, accelerometer and camera go together, "
+            f"the IMU at {1.0 / HOLE:.0f} Hz or more without pauses"
+        )
     rows, noise = [r for r, _ in made], float(np.mean([square for _, square in made]))
     square = float(np.mean(np.concatenate([r.terms[:, 0] for r in rows]) ** 2))
     if square < LEAST_ACCELERATION**2:
@@ -118,13 +125,17 @@ def marker_or_imu(
 def _rows(experiment: Experiment, m: int) -> tuple[Rows, float] | None:
     """Both components of every window of a trial, and the mean square of the force's noise in them.
 
-    None where a sensor is missing or the heading is not followed.
+    None where a sensor is missing, the IMU covers too little of the trial or pauses, or the heading is not followed.
     """
     steps, frames = int(experiment.steps[m]), experiment.frames[m]
     t: Array = DT * np.arange(steps, dtype=np.float64)
     gyro, accel = experiment.gyro[:steps, m], experiment.accel[:steps, m]
     known = np.isfinite(gyro) & np.isfinite(accel).all(axis=1)
-    if known.sum() < 0.5 * steps or len(frames.t) < LEAST_FRAMES:
+    gaps = np.diff(np.flatnonzero(known))
+    covered = gaps[gaps <= round(HOLE / DT)].sum()
+    if covered < COVERED * (steps - 1) or len(frames.t) < LEAST_FRAMES:
+        return None
+    if in_holes(known, round(PAUSE / DT)).any():  # the heading afterwards would be a guess
         return None
     rate = np.interp(t, t[known], gyro[known])
     heading, spread = followed_heading(t, rate, frames.t, frames.pose[:, 2])
@@ -136,17 +147,20 @@ def force_rows(experiment: Experiment, m: int, heading: Array) -> tuple[Rows, fl
     steps, frames = int(experiment.steps[m]), experiment.frames[m]
     t: Array = DT * np.arange(steps, dtype=np.float64)
     accel = experiment.accel[:steps, m]
-    known = np.flatnonzero(np.isfinite(accel).all(axis=1))
+    measured_at: NDArray[np.bool_] = np.asarray(np.isfinite(accel).all(axis=1))
+    known = np.flatnonzero(measured_at)
     if len(known) < LEAST_FRAMES:
         return None
     felt = np.column_stack([np.interp(t, t[known], v[known]) for v in accel.T])
+    lost = in_holes(measured_at, round(PAUSE / DT))
+    signs = np.where(np.arange(len(known)) % 2, -1.0, 1.0)  # every other sample less those between
+    others = np.column_stack([np.interp(t, t[known], signs * v[known]) for v in accel.T])
     turn = _turn(heading)
-    force = np.einsum("tij,tj->ti", turn, felt)
+    force, other_force = (np.einsum("tij,tj->ti", turn, x) for x in (felt, others))
     measured, terms, base, noise = [], [], [], []
-    others = np.where(np.arange(steps) % 2, -1.0, 1.0)  # every other sample less those between
     for centre in np.arange(HALF_WINDOW, t[-1] - HALF_WINDOW, STEP):
         seen = np.abs(frames.t - centre) < HALF_WINDOW
-        if seen.sum() < LEAST_FRAMES:
+        if seen.sum() < LEAST_FRAMES or lost[np.abs(t - centre) < HALF_WINDOW].any():
             continue
         w, dd = window(t - centre)
         seconds = second_derivative(frames.t[seen] - centre, frames.pose[seen, :2])
@@ -155,7 +169,7 @@ def force_rows(experiment: Experiment, m: int, heading: Array) -> tuple[Rows, fl
             np.einsum("t,tij->ij", w, turn),
             np.einsum("t,tij->ij", dd, turn),
         )
-        noise.append(np.mean(((w * others) @ force) ** 2))
+        noise.append(np.mean((w @ other_force) ** 2))
         measured.append(seconds - a)
         terms.append(np.column_stack([a, [-a[1], a[0]]]))
         base.append(np.hstack([bias, lever]))

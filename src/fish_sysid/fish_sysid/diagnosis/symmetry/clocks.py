@@ -6,9 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm, sem
+from scipy.stats import t as student
 
 from fish_sim.model import DT
-from fish_sysid.dataset.camera import DELAYS, Alignment, misfits
+from fish_sysid.dataset.camera import DELAYS, Alignment
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.symmetry.finding import Estimate, Evidence, SymmetryFinding, SymmetryTest
 from fish_sysid.diagnosis.symmetry.regression import evidence, jackknife
@@ -29,6 +31,7 @@ STILL_ROTOR, MOVING_ROTOR = 1.0, 10.0  # rad/s of the rotor's command before and
 REST = 0.5  # s, that the rotor must have stood before a start
 EARLY = 0.05  # s; a start is seen in the command a little after it
 STROKE = 0.5  # s; a fish answers its rotor within one stroke
+CHANCE = float(norm.sf(3.0))  # probability that the mean over trials is beyond a limit by chance
 BEYOND_NOISE = 6.0  # standard deviations of the gyro at rest
 LEAST_NOISE = 1e-3  # rad/s, a gyro's resolution
 
@@ -45,7 +48,7 @@ ENCODER_CLOCK = SymmetryTest(
     needs="an encoder, three trials, a rotor whose command changes",
 )
 IMU_CLOCK = SymmetryTest(
-    "IMU beside the command",
+    "IMU against the command",
     "sensor",
     assumes="a rotor that starts turns the head at once; finer than a stroke no statement is possible without a model",
     needs="a gyro, three trials in which the rotor stands for half a second and then starts",
@@ -54,16 +57,15 @@ IMU_CLOCK = SymmetryTest(
 
 def camera_clock(experiment: Experiment, alignment: Alignment) -> SymmetryFinding:
     """The test for `camera_latency`: headings of the camera against those of the gyro."""
-    squares, count = misfits(experiment)
-    used = squares[count > 0]
     if not np.isfinite(experiment.gyro).any():
-        return CAMERA_CLOCK.cannot_tell("no gyro was recorded")
-    if len(used) < FEWEST_TRIALS:
+        return CAMERA_CLOCK.cannot_tell("no gyro sample can be used")
+    squares = alignment.squares
+    if len(squares) < FEWEST_TRIALS:
         return CAMERA_CLOCK.cannot_tell("fewer than three trials are long enough")
-    total = used.mean(axis=0)
+    total = squares.mean(axis=0)
     if total.max() < SHARP * total.min():
         return CAMERA_CLOCK.cannot_tell("no turns: every delay fits as well")
-    delay, told, better = _best_delay(used)
+    delay, told, better = _best_delay(squares)
     text = f"images are {delay.value:.2f} s older than their stamps"
     return CAMERA_CLOCK.answer(alignment.delay > 0.0 and better, text, {"delay": delay}, told)
 
@@ -84,7 +86,8 @@ def _best_delay(squares: Array) -> tuple[Estimate, Evidence, bool]:
 def encoder_clock(experiment: Experiment) -> SymmetryFinding:
     """By how much the encoder's speed is behind the commanded one."""
     if not np.isfinite(experiment.encoder).any():
-        return ENCODER_CLOCK.cannot_tell("no encoder was recorded")
+        text = "no encoder sample is left to compare: none can be used, or the measured speed drives the model"
+        return ENCODER_CLOCK.cannot_tell(text)
     rows = [_behind(experiment, m) for m in range(len(experiment.names))]
     squares = np.array([row for row in rows if row is not None])
     if len(squares) < FEWEST_TRIALS:
@@ -108,16 +111,20 @@ def _behind(experiment: Experiment, m: int) -> Array | None:
 
 
 def imu_clock(experiment: Experiment) -> SymmetryFinding:
-    """How long after the rotor's start the gyro moves: before it no fish does, and none waits for a stroke."""
+    """How long after the rotor's start the gyro moves: before it no fish does, and none waits for a stroke.
+
+    The mean over M trials must be beyond by Student's t with M - 1 degrees of freedom.
+    """
     if not np.isfinite(experiment.gyro).any():
-        return IMU_CLOCK.cannot_tell("no gyro was recorded")
+        return IMU_CLOCK.cannot_tell("no gyro sample can be used")
     answers = [_answer_time(experiment, m) for m in range(len(experiment.names))]
     times = np.array([t for t in answers if t is not None])
     if len(times) < FEWEST_TRIALS:
         text = f"{len(times)} trials in which the rotor starts from rest, fewer than three"
         return IMU_CLOCK.cannot_tell(text)
-    middle, std = float(times.mean()), float(times.std(ddof=1) / np.sqrt(len(times)))
-    found = middle + 3.0 * std < -EARLY or middle - 3.0 * std > STROKE
+    middle, std = float(times.mean()), float(sem(times))
+    unsure = std * float(student.isf(CHANCE, len(times) - 1))
+    found = middle + unsure < -EARLY or middle - unsure > STROKE
     text = f"the gyro moves {middle:.2f} s after the rotor's start"
     return IMU_CLOCK.answer(found, text, {"answer": Estimate(middle, std, "s")})
 

@@ -10,8 +10,6 @@ from typing import Any, Literal
 
 Status = Literal["found", "not found", "cannot tell"]
 
-FEW_TRIALS = "fewer than three usable trials"
-
 
 @dataclass(frozen=True)
 class Estimate:

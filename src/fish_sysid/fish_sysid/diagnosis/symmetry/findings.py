@@ -12,12 +12,13 @@ from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.symmetry.accelerometer import accelerations, marker_or_imu
 from fish_sysid.diagnosis.symmetry.clocks import camera_clock, encoder_clock, imu_clock
 from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
-from fish_sysid.diagnosis.symmetry.galilei import uniform_flow
-from fish_sysid.diagnosis.symmetry.mirror import mirror_symmetry
-from fish_sysid.diagnosis.symmetry.place import place_tests
-from fish_sysid.diagnosis.symmetry.scales import gyro_scale, heading_offset
+from fish_sysid.diagnosis.symmetry.galilei import UNIFORM_FLOW
+from fish_sysid.diagnosis.symmetry.mirror import MIRROR
+from fish_sysid.diagnosis.symmetry.place import PATCH, VARYING_FLOW, WALL_EFFECT
+from fish_sysid.diagnosis.symmetry.scales import GYRO_SCALE, HEADING_OFFSET
 from fish_sysid.diagnosis.symmetry.stroke_means import stroke_means
 
+REGRESSIONS = (UNIFORM_FLOW, GYRO_SCALE, HEADING_OFFSET, VARYING_FLOW, WALL_EFFECT, PATCH, MIRROR)
 GIVEN = "the given robot has it, and its values are refitted"
 
 
@@ -29,18 +30,10 @@ def symmetry_findings(experiment: Experiment, robot: Robot) -> tuple[SymmetryFin
     alignment = align(experiment)
     timed = moved_back(experiment, alignment.delay)
     trials = stroke_means(timed)
+    flow, gyro, marker, *others = (test.find(trials) for test in REGRESSIONS)
     scale, axes = accelerations(timed)
-    findings = (
-        uniform_flow(trials),
-        camera_clock(experiment, alignment),
-        encoder_clock(experiment),
-        imu_clock(experiment),
-        gyro_scale(trials),
-        scale,
-        *marker_or_imu(heading_offset(trials), axes),
-        *place_tests(trials),
-        mirror_symmetry(trials),
-    )
+    clocks = camera_clock(experiment, alignment), encoder_clock(experiment), imu_clock(experiment)
+    findings = (flow, *clocks, gyro, scale, *marker_or_imu(marker, axes), *others)
     own = {*robot.effects, *robot.sensors}
     return tuple(
         replace(f, reason=GIVEN) if f.status == "found" and f.name in own else f for f in findings

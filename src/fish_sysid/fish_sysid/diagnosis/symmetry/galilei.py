@@ -13,43 +13,19 @@ velocity that is constant in the pool frame is left for V.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fish_sysid.dataset.grid import in_base_link
-from fish_sysid.diagnosis.symmetry.finding import FEW_TRIALS, SymmetryFinding, SymmetryTest
-from fish_sysid.diagnosis.symmetry.regression import Rows, judge
-from fish_sysid.diagnosis.symmetry.stroke_means import StrokeMeans
-from fish_sysid.estimation.thresholds import FEWEST_TRIALS, LEAST_OWN_SHARE, SYMMETRY_GAIN
+from fish_sysid.diagnosis.symmetry.regression import Conclusion, Judged, RegressionTest, Rows
+from fish_sysid.diagnosis.symmetry.stroke_means import StrokeMeans, Trials
+from fish_sysid.estimation.thresholds import SYMMETRY_GAIN
 
 Array = NDArray[np.float64]
 
-UNIFORM_FLOW = SymmetryTest(
-    "current",
-    "physics",
-    assumes="the water's velocity is the same everywhere and at all times; commands alone drive the fish",
-    needs="three trials and several headings at the same commands",
+TOO_FEW_HEADINGS = (
+    "too few headings: all but {:.0%} of what a flow does could be the fish's own swimming"
 )
-
-
-def uniform_flow(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
-    """The test for `current`."""
-    if len(trials) < FEWEST_TRIALS:
-        return UNIFORM_FLOW.cannot_tell(FEW_TRIALS)
-    judged = judge([Rows(black_box(s), carried(s), ground_velocity(s)) for s in trials])
-    if judged.own_share < LEAST_OWN_SHARE:
-        return UNIFORM_FLOW.cannot_tell(too_few_headings(judged.own_share))
-    x, y = judged.estimate(-2, "m/s"), judged.estimate(-1, "m/s")
-    found = judged.stands(SYMMETRY_GAIN, -2, -1)
-    text = f"the water moves by ({x.value:.3f} ± {x.std:.3f}, {y.value:.3f} ± {y.std:.3f}) m/s"
-    return UNIFORM_FLOW.answer(found, text, {"x": x, "y": y}, judged.evidence)
-
-
-def too_few_headings(share: float) -> str:
-    """Why a flow cannot be told from the fish's own swimming."""
-    return f"too few headings: all but {share:.0%} of what a flow does could be the fish's own swimming"
 
 
 def ground_velocity(trial: StrokeMeans) -> Array:
@@ -84,3 +60,24 @@ def carried(trial: StrokeMeans) -> Array:
     """Columns (2C, 2) of flows of 1 m/s along x and along y."""
     flows = (np.tile(axis, (len(trial.t), 1)) for axis in np.eye(2))
     return np.column_stack([in_body_frame(trial, flow) for flow in flows])
+
+
+def _rows(trial: StrokeMeans) -> Rows:
+    return Rows(black_box(trial), carried(trial), ground_velocity(trial))
+
+
+def _flow(judged: Judged, _: Trials) -> Conclusion:
+    x, y = judged.estimate(-2, "m/s"), judged.estimate(-1, "m/s")
+    text = f"the water moves by ({x.value:.3f} ± {x.std:.3f}, {y.value:.3f} ± {y.std:.3f}) m/s"
+    return judged.stands(SYMMETRY_GAIN, -2, -1), text, {"x": x, "y": y}
+
+
+UNIFORM_FLOW = RegressionTest(
+    "current",
+    "physics",
+    assumes="the water's velocity is the same everywhere and at all times; commands alone drive the fish",
+    needs="three trials and several headings at the same commands",
+    rows=_rows,
+    spanned=TOO_FEW_HEADINGS,
+    conclude=_flow,
+)

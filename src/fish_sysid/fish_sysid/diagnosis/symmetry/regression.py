@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether further terms of a linear regression predict trials that took no part in the fit.
+"""Symmetry tests by regression: whether further terms predict the trials that took no part in the fit.
 
 Ordinary least squares without a ridge, on columns of unit length; directions that the columns hardly span are left out.
 Standard errors are those of the jackknife over trials (Efron 1982), as residuals of one trial are correlated:
@@ -10,16 +10,24 @@ Standard errors are those of the jackknife over trials (Efron 1982), as residual
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import sem
 from scipy.stats import t as student
 
-from fish_sysid.diagnosis.symmetry.finding import Estimate, Evidence
+from fish_sysid.diagnosis.symmetry.finding import (
+    Estimate,
+    Evidence,
+    SymmetryFinding,
+    SymmetryTest,
+)
+from fish_sysid.diagnosis.symmetry.stroke_means import StrokeMeans, Trials
 from fish_sysid.estimation.thresholds import (
     FEWEST_TRIALS,
+    LEAST_OWN_SHARE,
     NEARLY_COLLINEAR,
     SMALLEST_SQUARE,
     SMALLEST_Z,
@@ -27,6 +35,7 @@ from fish_sysid.estimation.thresholds import (
 )
 
 Array = NDArray[np.float64]
+Conclusion = tuple[bool, str, Mapping[str, Estimate]]  # found, its statement, parameters
 
 
 @dataclass(frozen=True)
@@ -56,6 +65,34 @@ class Judged:
     def estimate(self, at: int, unit: str) -> Estimate:
         """Coefficient `at` with its standard error."""
         return Estimate(float(self.coefficients[at]), float(self.std[at]), unit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegressionTest(SymmetryTest):
+    """A symmetry test on stroke means: the terms of its regression are what breaks the symmetry."""
+
+    rows: Callable[[StrokeMeans], Rows]  # of the regression, from one trial
+    conclude: Callable[[Judged, Trials], Conclusion]
+    usable: Callable[[Trials], Trials] = tuple  # trials that have what the rows need
+    few: Callable[[int], str] = lambda _: "fewer than three usable trials"  # by how many there are
+    lacking: Callable[[Trials], str] = lambda _: ""  # why usable trials cannot tell, "" if they can
+    spanned: str = ""  # why they cannot where the base columns span all of the terms but a share {}
+    one_by_one: bool = (
+        False  # whether that share is of single terms, which may be alike among each other
+    )
+
+    def find(self, trials: Trials) -> SymmetryFinding:
+        """The answer of these trials."""
+        trials = self.usable(trials)
+        if len(trials) < FEWEST_TRIALS:
+            return self.cannot_tell(self.few(len(trials)))
+        if reason := self.lacking(trials):
+            return self.cannot_tell(reason)
+        judged = judge([self.rows(trial) for trial in trials])
+        share = judged.term_share if self.one_by_one else judged.own_share
+        if share < LEAST_OWN_SHARE:
+            return self.cannot_tell(self.spanned.format(share))
+        return self.answer(*self.conclude(judged, trials), judged.evidence)
 
 
 def judge(trials: Sequence[Rows]) -> Judged:
@@ -101,7 +138,9 @@ def jackknife(left_out: Array) -> Array:
 
 def evidence(gains: Array) -> Evidence:
     """Mean, standard error and one-sided p value of log gains (M,) of left-out trials."""
-    mean, std = float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains)))
+    mean, std = float(gains.mean()), float(sem(gains))
+    if not np.isfinite(mean):
+        return Evidence(mean, std, 1.0)
     p = float(student.sf(mean / std, len(gains) - 1)) if std > 0.0 else float(mean <= 0.0)
     return Evidence(mean, std, p)
 

@@ -8,14 +8,17 @@ Windows of a mean end `lag` before the centre of the pose's window; negative lag
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
+from fish_sysid.dataset.camera import HOLE
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.prediction.stroke_average import stroke_mean
+from fish_sysid.dataset.grid import in_holes
+from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 Array = NDArray[np.float64]
 
@@ -34,11 +37,14 @@ class StrokeMeans:
     t: Array  # (C,) s
     pose: Array  # (C, 3) x, y [m], psi [rad]
     velocity: Array  # (C, 3) u, v [m/s], r [rad/s] over ground, by the camera
-    gyro: Array  # (C,) rad/s, NaN where it says nothing
+    gyro: Array  # (C,) rad/s, NaN where it says nothing: without a gyro, and where it pauses in the window
     even: Array  # (C, 12) features of throttle and squared rudder
     odd: Array  # (C, 8) features odd in the rudder
     throttle: Array  # (C, 2) mean squared rotor speed of the last two seconds, in units of ROTOR^2
     rudder: Array  # (C,) mean rudder in the window, in units of RUDDER
+
+
+Trials = Sequence[StrokeMeans]
 
 
 def stroke_means(experiment: Experiment) -> tuple[StrokeMeans, ...]:
@@ -57,8 +63,17 @@ def _trial(experiment: Experiment, m: int) -> StrokeMeans:
     even, odd, throttle, rudder = features(experiment.commands[:steps, m], t)
     # the same weights on the gyro's angle at the same moments: both means are of the same rate
     turned = DT * (np.cumsum(gyro := filled(experiment.gyro[:steps, m])) - 0.5 * gyro)
-    gyro = weights.slope[covered] @ np.interp(frames.t, DT * np.arange(steps), turned)
-    return StrokeMeans(t, motion[:, :3], motion[:, 3:], gyro, even, odd, throttle, rudder)
+    rate = weights.slope[covered] @ np.interp(frames.t, DT * np.arange(steps), turned)
+    rate[_pauses(experiment.gyro[:steps, m], t)] = np.nan
+    return StrokeMeans(t, motion[:, :3], motion[:, 3:], rate, even, odd, throttle, rudder)
+
+
+def _pauses(gyro: Array, t: Array) -> NDArray[np.bool_]:
+    """Whether the gyro (T,) has a hole in the windows (C,) around t."""
+    lost = np.concatenate([[0], np.cumsum(in_holes(np.isfinite(gyro), round(HOLE / DT)))])
+    first, last = (np.round((t + side) / DT).astype(int) for side in (-HALF_WINDOW, HALF_WINDOW))
+    end = len(gyro)
+    return np.asarray(lost[np.clip(last + 1, 0, end)] > lost[np.clip(first, 0, end)])
 
 
 def filled(values: Array) -> Array:

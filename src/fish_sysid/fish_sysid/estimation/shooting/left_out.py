@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, t
+from scipy.stats import norm, sem, t
 
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.shooting.least_squares import weight
@@ -135,15 +135,16 @@ def left_out_costs(experiment: Experiment, found: Found) -> tuple[Found, Array]:
 def converged(
     experiment: Experiment, starts: Iterable[Found], contained: float
 ) -> tuple[Found, Array]:
-    """`left_out_costs` from the first of these starts that ends as low as a fit which it contains, or from the last.
+    """`left_out_costs` from the first of these starts that ends as low as a fit which it contains, or else from the best.
 
     contained: cost of that fit. One that ends higher has not converged, and starts again.
     """
+    ended: list[tuple[Found, Array]] = []
     for start in starts:
-        fit, costs = left_out_costs(experiment, start)
-        if fit.cost <= (1.0 + SETTLED) * contained:
+        ended.append(left_out_costs(experiment, start))
+        if ended[-1][0].cost <= (1.0 + SETTLED) * contained:
             break
-    return fit, costs
+    return min(ended, key=lambda one: one[0].cost)
 
 
 def judged(name: str, control: Array, costs: Array, looked_at: int = 1) -> Step:
@@ -153,7 +154,7 @@ def judged(name: str, control: Array, costs: Array, looked_at: int = 1) -> Step:
     """
     ratio = np.log(control / costs)
     ratio = ratio[np.isfinite(ratio)]
-    deviation = float(np.std(ratio, ddof=1) / np.sqrt(len(ratio))) if len(ratio) > 1 else np.inf
+    deviation = float(sem(ratio)) if len(ratio) > 1 else np.inf
     gain = float(ratio.mean()) if len(ratio) else 0.0
     chance = (
         t.sf(gain / deviation, max(len(ratio) - 1, 1)) if deviation > 0.0 else float(gain <= 0.0)

@@ -29,12 +29,7 @@ from fish_sysid.estimation.shooting.residuals import (
     ahead_in,
     residuals,
 )
-from fish_sysid.estimation.shooting.rollout import (
-    Directions,
-    memories,
-    poses,
-    poses_and_slopes,
-)
+from fish_sysid.estimation.shooting.rollout import poses_and_slopes, states
 
 Array = NDArray[np.float64]
 
@@ -120,15 +115,14 @@ class Shooting:
         p = self.coordinates.filter_inputs(theta)[0]
         stepper, steps = self.coordinates.stepper, round(RUN_IN / DT)
         nq = stepper.layout.links + 3
-        early = replace(self.windows, start=np.maximum(self.windows.start - steps, 0), steps=steps)
         rows = np.maximum(self.windows.start + np.arange(-steps, 0)[:, None], 0)
         told = self.experiment.commands[rows, self.windows.trial]
-        memory = memories(stepper, self.experiment, early, Directions(p[None]))[0]
+        early = replace(self.windows, start=rows[0], steps=steps, commands=told)
         pose, rate = self._seen_at_start()
         x = np.zeros((len(self.windows), self.nx))
         x[:, 2:nq] = pose[:, 2:]
         x[:, nq : nq + 2] = rate[:, :2]
-        end = stepper.rollout(np.concatenate([x, memory], axis=1), told, p)[-1, :, : self.nx]
+        end = states(stepper, self.experiment, early, p, x)[-1, :, : self.nx]
         lost = ~np.isfinite(end).all(axis=1) | (np.abs(end[:, nq:]).max(axis=1) > 60.0)
         end[lost] = x[lost]
         return end
@@ -149,19 +143,17 @@ class Shooting:
     def residuals(self, guess: Guess, theta_slopes: bool = True) -> Residuals:
         """With slopes along everything, or along the start states alone."""
         p, dp, _ = self.coordinates.filter_inputs(guess.theta)
-        directions = Directions.of(p, dp if theta_slopes else dp[:0])
-        stepper = self.coordinates.stepper
-        memory = memories(stepper, self.experiment, self.windows, directions)
-        pose, slope = poses_and_slopes(stepper, self.windows, directions, memory, guess.x)
-        count = len(directions.p) - 1
-        return residuals(self.windows, self.scale, pose, slope, count, guess.sensors, guess.zero)
+        dp = dp if theta_slopes else dp[:0]
+        pose, slope = poses_and_slopes(
+            self.coordinates.stepper, self.experiment, self.windows, p, dp, guess.x
+        )
+        return residuals(self.windows, self.scale, pose, slope, len(dp), guess.sensors, guess.zero)
 
     def errors(self, guess: Guess) -> Residuals:
         """Without slopes."""
         p = self.coordinates.filter_inputs(guess.theta)[0]
         stepper = self.coordinates.stepper
-        memory = memories(stepper, self.experiment, self.windows, Directions(p[None]))[0]
-        pose = poses(stepper, self.windows, p, memory, guess.x)
+        pose = states(stepper, self.experiment, self.windows, p, guess.x)[..., :3]
         return residuals(self.windows, self.scale, pose, None, 0, guess.sensors, guess.zero)
 
     def costs(self, guess: Guess, found: Residuals) -> Array:

@@ -145,7 +145,8 @@ class Multistep:
                 lanes, np.repeat(told[:, own], C, axis=1), np.tile(P, (len(own), 1))
             )
             pose = moved[..., :3].reshape(T + 1, len(own), C, 3)
-            return forward(pose, camera[:, 0])
+            with np.errstate(invalid="ignore"):  # of motions that diverged, see `_cleaned`
+                return forward(pose, camera[:, 0])
 
         count = max(2 * cores(), len(start) * C // LANES)
         shares = np.array_split(np.arange(len(start)), max(1, min(count, len(start))))

@@ -125,7 +125,7 @@ class PredictionFit:
 
 
 def with_links(robot: Robot, links: int) -> Robot:
-    """The robot with another number of links, each parameter as far from nominal as it is."""
+    """The same fish with its tail cut into another number of equal links: totals and ratios to nominal values stay."""
     if links == robot.links:
         return robot
     before, after = nominal_parameters(robot.links), nominal_parameters(links)
@@ -238,7 +238,8 @@ def other_links(
 def uncertainty(experiment: Experiment, found: Found) -> tuple[Array, Array]:
     """(covariance (P, P) clustered by trial, spread (P,) over folds) of z.
 
-    The folds' fits are one Gauss-Newton step from the optimum, without a fold's trials each; the spread is the jackknife's.
+    The folds' fits are one Gauss-Newton step from the optimum, without a fold's trials each; the spread is the jackknife's. One
+    trial is one fold, whose spread is NaN.
     """
     cost = multistep(experiment, found)
     states = cost.states(found.z)
@@ -248,7 +249,7 @@ def uncertainty(experiment: Experiment, found: Found) -> tuple[Array, Array]:
     trial = np.repeat(cost.targets.trial, e.shape[1])
     scores = scores_by_trial(flat, weight(flat), rows, trial)
     moved = without_folds(cost, found.z, states)
-    count = len(moved)
+    count = len(moved) if len(moved) > 1 else np.nan
     spread = np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0))
     return clustered_covariance(scores, normal, cost.prior), spread
 

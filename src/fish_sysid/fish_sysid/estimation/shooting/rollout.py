@@ -11,8 +11,6 @@ Slopes are forward differences: one more lane of the value kernel per direction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,23 +52,14 @@ def quick_stepper(coordinates: Parametrization, theta: Array) -> Stepper:
     return Stepper(robot.structure, stable_scheme(robot, QUICK))
 
 
-@dataclass(frozen=True)
-class Directions:
-    """Parameter vectors to simulate with: the first is the value, the others one step along theta each."""
-
-    p: Array  # (K + 1, NP)
-
-    @classmethod
-    def of(cls, p: Array, dp: Array) -> Directions:
-        """From parameters (NP,) and their slopes dp (K, NP) with respect to theta."""
-        return cls(np.concatenate([p[None], p + STEP * dp]))
+def states(stepper: Stepper, experiment: Experiment, windows: Windows, p: Array, x: Array) -> Array:
+    """(steps + 1, W, NS) states from start motions x (W, NX), with parameters p (NP,) and the commands before the windows."""
+    memory = memories(stepper, experiment, windows, p[None])[0]
+    return stepper.rollout(np.concatenate([x, memory], axis=1), windows.commands, p)
 
 
-def memories(
-    stepper: Stepper, experiment: Experiment, windows: Windows, directions: Directions
-) -> Array:
-    """(K + 1, W, NM) memory of servo, motor and actuator effects at the windows' starts."""
-    p = directions.p
+def memories(stepper: Stepper, experiment: Experiment, windows: Windows, p: Array) -> Array:
+    """(L, W, NM) memory of servo, motor and actuator effects at the windows' starts, with parameters p (L, NP)."""
     out = np.empty((len(p), len(windows), len(stepper.layout.memory)))
     for m in np.unique(windows.trial).tolist():
         own = np.flatnonzero(windows.trial == m)
@@ -85,22 +74,21 @@ def memories(
     return out
 
 
-def poses(stepper: Stepper, windows: Windows, p: Array, memory: Array, x: Array) -> Array:
-    """(steps + 1, W, 3) poses from motions x (W, NX) with memory (W, NM) and parameters p (NP,)."""
-    states = stepper.rollout(np.concatenate([x, memory], axis=1), windows.commands, p)
-    return np.ascontiguousarray(states[..., :3])
-
-
 def poses_and_slopes(
-    stepper: Stepper, windows: Windows, directions: Directions, memory: Array, x: Array
+    stepper: Stepper, experiment: Experiment, windows: Windows, p: Array, dp: Array, x: Array
 ) -> tuple[Array, Array]:
-    """Poses (steps + 1, W, 3) and slopes (steps + 1, W, 3, K + NX) along theta and the start motions x (W, NX)."""
-    K, nx = len(directions.p) - 1, x.shape[1]
+    """Poses (steps + 1, W, 3) and slopes (steps + 1, W, 3, K + NX) along theta and the start motions x (W, NX).
+
+    p (NP,): parameters; dp (K, NP): their slopes with respect to theta.
+    """
+    K, nx = len(dp), x.shape[1]
     C = 1 + K + nx
+    p = np.concatenate([p[None], p + STEP * dp])
+    memory = memories(stepper, experiment, windows, p)
     start = np.repeat(np.concatenate([x, memory[0]], axis=1)[:, None], C, axis=1)
     start[:, 1 : 1 + K, nx:] = memory[1:].transpose(1, 0, 2)
     start[:, 1 + K + np.arange(nx), np.arange(nx)] += STEP
-    p = np.concatenate([directions.p, np.repeat(directions.p[:1], nx, axis=0)])
+    p = np.concatenate([p, np.repeat(p[:1], nx, axis=0)])
 
     def share(own: NDArray[np.int64]) -> tuple[Array, Array]:
         told = np.repeat(windows.commands[:, own], C, axis=1)

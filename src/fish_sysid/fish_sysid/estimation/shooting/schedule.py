@@ -26,12 +26,12 @@ from fish_report.parallel import on_all_cores
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.parametrization import Hypothesis, Parametrization, nominal_hypothesis
+from fish_sysid.estimation.parametrization import Hypothesis, nominal_hypothesis
 from fish_sysid.estimation.shooting.multiple_shooting import Shooting
 from fish_sysid.estimation.shooting.multistep import Multistep
 from fish_sysid.estimation.shooting.residuals import SENSORS, Scale, cut, regular_starts
 from fish_sysid.estimation.shooting.rollout import ShotParametrization
-from fish_sysid.estimation.shooting.start_states import PAST, START_TRUST
+from fish_sysid.estimation.shooting.start_states import PAST, START_TRUST, without_sensor_errors
 from fish_sysid.prediction.prediction import WARM_UP, start_points
 
 Array = NDArray[np.float64]
@@ -65,15 +65,15 @@ class Found:
     trust: Scale = START_TRUST  # of start states in the sensors
 
 
-def ladder_start(coordinates: Parametrization, stiffness: float, heavy: float) -> Array:
+def ladder_start(hypothesis: Hypothesis, stiffness: float, heavy: float) -> Array:
     """Theta (K,) with the tail's stiffness and all masses and drags in sway times these factors."""
-    values = coordinates.start.copy()
-    for i, name in enumerate(coordinates.hypothesis.free):
+    values = hypothesis.parametrization.start.copy()
+    for i, name in enumerate(hypothesis.free):
         if name == "tail_stiffness":
             values[i] *= stiffness
         elif "." not in name and name.endswith(("added_mass_sway", "drag_sway")):
             values[i] *= heavy
-    return coordinates.encode(values)
+    return hypothesis.parametrization.encode(values)
 
 
 def shoot(
@@ -107,12 +107,11 @@ def best_start(
     experiment: Experiment, hypothesis: Hypothesis, report: Report = lambda _: None
 ) -> Found:
     """The best of the optima that the ladder of stiffnesses leads to, by coarse predictions."""
-    origin = Parametrization(hypothesis)
     stiffer = ", ".join(f"{stiffness:g}" for stiffness, _ in LADDER)
     report(f"shooting, {hypothesis.robot.links} links, tail {stiffer} times as stiff")
 
     def climbed(rung: tuple[float, float]) -> Found:
-        _, z = shoot(experiment, hypothesis, ladder_start(origin, *rung))
+        _, z = shoot(experiment, hypothesis, ladder_start(hypothesis, *rung))
         start = Found(hypothesis, z, np.inf)
         cost, z = multistep(experiment, start, 4.0 * FINE).improve(z, 2, 2)
         return Found(hypothesis, z, cost)
@@ -138,16 +137,18 @@ def misfit(
 ) -> float:
     """The larger of the camera's residuals in position and heading over their noise (medians), of the better start.
 
-    effects: that the model may have as well, all at once. 0 where no window can be cut: nothing speaks against the model.
+    effects: that the model may have as well, all at once, whatever the robot has of them. What the robot states of the camera is
+    taken out of the images first. 0 where no window can be cut: nothing speaks against the model.
     """
+    experiment, sizes = without_sensor_errors(experiment, robot), []
     windows = cut(experiment, regular_starts(experiment, length, APART, FIRST), length)
     if not len(windows):
         return 0.0
-    hypothesis, sizes = nominal_hypothesis(robot, tuple(free)), []
+    hypothesis = nominal_hypothesis(robot, tuple(free))
     for name in effects:
-        hypothesis = hypothesis.with_effect(name, FAINT)
+        hypothesis = hypothesis.without(name).with_effect(name, FAINT)
     for stiffness, heavy in LADDER[:2]:
-        theta = ladder_start(ShotParametrization(hypothesis), stiffness, heavy)
+        theta = ladder_start(hypothesis, stiffness, heavy)
         shooting = Shooting(experiment, ShotParametrization(hypothesis, theta), windows)
         guess = shooting.settle(shooting.first_guess(theta))
         _, guess = shooting.fit(guess, FOLLOWING)

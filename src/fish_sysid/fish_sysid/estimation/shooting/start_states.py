@@ -17,11 +17,10 @@ from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sysid.dataset.camera import moved_back
 from fish_sysid.dataset.experiment import Experiment, Frames
-from fish_sysid.estimation.ekf_types import SensorModel
-from fish_sysid.estimation.parametrization import nominal_hypothesis
+from fish_sysid.estimation.parametrization import nominal_hypothesis, sensor_model
 from fish_sysid.estimation.shooting.multiple_shooting import Shooting
 from fish_sysid.estimation.shooting.residuals import SENSORS, Scale, cut
-from fish_sysid.estimation.shooting.rollout import Directions, ShotParametrization, memories
+from fish_sysid.estimation.shooting.rollout import ShotParametrization, states
 
 Array = NDArray[np.float64]
 
@@ -32,8 +31,9 @@ ITERATIONS = 6
 START_TRUST = Scale(position=0.002, heading=0.012, orientation=0.012, fading=0.5)
 
 
-def without_sensor_errors(experiment: Experiment, sensors: SensorModel) -> Experiment:
-    """The experiment with its images as they would be without latency, heading offset and scale of the camera."""
+def without_sensor_errors(experiment: Experiment, robot: Robot) -> Experiment:
+    """The experiment with its images as they would be without the robot's latency, heading offset and scale of the camera."""
+    sensors = sensor_model(robot)
     moved = moved_back(experiment, sensors.camera_latency)
     shown = np.array([sensors.camera_scale, sensors.camera_scale, 1.0])
     offset = np.array([0.0, 0.0, sensors.camera_heading_offset])
@@ -69,8 +69,7 @@ def shot_states(
     sensors = np.zeros(len(SENSORS)) if sensors is None else sensors
     guess = shooting.settle(shooting.first_guess(np.zeros(0), sensors), ITERATIONS)
     p = coordinates.filter_inputs(np.zeros(0))[0]
-    memory = memories(stepper, experiment, windows, Directions(p[None]))[0]
-    end = stepper.rollout(np.concatenate([guess.x, memory], axis=1), windows.commands, p)[steps]
+    end = states(stepper, experiment, windows, p, guess.x)[steps]
     place = {row: i for i, row in enumerate(map(tuple, starts.tolist()))}
     ends = np.column_stack([windows.trial, windows.start + steps]).tolist()
     out[[place[tuple(row)] for row in ends]] = end
