@@ -78,7 +78,7 @@ def calibration_files(folder: Path) -> None:
 
 def fusion_frame(folder: Path) -> None:
     """The folder's feed.py against the node: 2 s of poses in pool, then 2 s in another frame."""
-    environment = {"ROS_DOMAIN_ID": "58", **os.environ}
+    environment = {"ROS_DOMAIN_ID": "166", **os.environ}
     command = [sys.executable, "-c", "from fish_control.nodes.entry import fusion; fusion()"]
     with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as node:
         try:

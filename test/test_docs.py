@@ -327,7 +327,7 @@ def test_a_robot_file_on_a_page_can_be_read(tmp_path):
     file = tmp_path / "robot.yaml"
     file.write_text(text)
     robot = load_robot(file)
-    assert robot.parameters["head_mass"] == 3.9
+    assert robot.parameters["head_mass"] == 0.51
     assert robot.effects["quadratic_drag"]["surge"] == 0.6
 
 

@@ -21,7 +21,6 @@ from fish_node.domain import domain_in_use
 
 NODES = (*ROBOTS["sim"], EXCITER)
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-END_WITHIN = 5.0  # s
 
 
 def settings(spec, folder):
@@ -58,8 +57,9 @@ def ended(request, tmp_path_factory):
                     said[spec] = watch.levels[f"fish/{spec.executable}"]
         for process, *_ in started.values():
             process.signal(request.param)
+        deadline = time.monotonic() + PATIENCE  # all of them end at once
         for spec, (process, *_) in started.items():
-            status[spec] = process.wait(END_WITHIN)
+            status[spec] = process.wait(max(deadline - time.monotonic(), 0.0))
     return said, status
 
 

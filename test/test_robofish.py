@@ -39,6 +39,7 @@ from fish_control.reference_path import ReferencePath
 from fish_report import robofish as command
 from fish_report.robofish import BROUGHT_BY
 from fish_sim.robot import Robot
+from fish_sim.robot_file import save_robot
 from fish_sysid.prediction.prediction import ErrorSizes
 from fish_sysid.reports.diagnosis_figures import program, water_over_the_pool, when_it_acts
 from fish_sysid.reports.identify_tables import bias_table, error_table, parameter_table
@@ -99,6 +100,12 @@ def test_a_comparison_has_no_choice_of_the_search(option, tmp_path, capsys):
     days = [str(tmp_path), "--baseline", str(tmp_path), "--out", str(tmp_path / "out")]
     assert command.main(["diagnose", *days, option, "0.1"]) == 1
     assert f"{option} goes without --baseline" in capsys.readouterr().err
+
+
+def test_an_unknown_stage_is_refused_before_anything_is_read(tmp_path, capsys):
+    given = ["diagnose", str(tmp_path), "--out", str(tmp_path / "out"), "--without", "magic"]
+    assert command.main(given) == 1
+    assert "--without: got magic; expected stages of the search: " in capsys.readouterr().err
 
 
 def test_no_such_entry_point():
@@ -228,6 +235,21 @@ def test_excite_says_how_long_the_last_row_lasts(tmp_path, capsys):
         "expected 0 to 12 s: the program lasts 15 s (8 s from its last row on), a swim at least 3 s"
     )
     assert expected in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "verb", [["inspect", "--html"], ["predict", "--model", "robot.yaml", "--out"]]
+)
+def test_a_folder_in_the_place_of_a_file_is_refused_before_the_work(
+    verb, tmp_path, monkeypatch, capsys
+):
+    samples.robot_recording(tmp_path / "swum")
+    monkeypatch.chdir(tmp_path)
+    save_robot(Robot(), Path("robot.yaml"))
+    assert command.main([verb[0], "swum", *verb[1:], "swum"]) == 1
+    told = capsys.readouterr()
+    assert f"{verb[-1]} swum: is a folder; expected a file, choose another name" in told.err
+    assert not told.out
 
 
 def test_inspect_without_page(tmp_path, capsys, monkeypatch):

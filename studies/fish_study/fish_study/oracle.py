@@ -19,8 +19,8 @@ from fish_study.scenario import Scenario
 from fish_study.swim import Readings, kept_trials
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.map_fit import Fit, climb, evaluate
-from fish_sysid.estimation.noise_estimation import estimate_noise, usual_noise
+from fish_sysid.estimation.map_fit import Fit, climb, estimate_noise, evaluate
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import Hypothesis, nominal_hypothesis
 from fish_sysid.prediction.prediction import predict, prediction_errors
 
