@@ -31,7 +31,7 @@ With the neutral value the robot is the nominal one. The typical value is a plau
 
 def effects_page() -> str:
     """Effects on the fish, then the sensors' errors."""
-    count = f"{len(EFFECTS) - 1} effects on fish, water and actuators, {len(SENSOR_EFFECTS)} errors of sensors"
+    count = f"{len(EFFECTS)} effects on fish, water and actuators, {len(SENSOR_EFFECTS)} errors of sensors"
     links = ((f"[`{name}`](#{name})", cell(e.equation)) for name, e in every())
     body = [section(name, effect) for name, effect in every()]
     return "\n".join(
@@ -90,7 +90,17 @@ parameters:
   head_mass: {value: 0.465, unit: kg}
 ```
 
-The values below are those of the default of three tail links. The order is that of the parameter vector in Python.
+| key | what it holds |
+|---|---|
+| `format` | 1 |
+| `name`, `notes` | text; `diagnose` writes its verdict into `notes` |
+| `links` | number of tail links, 3 where it is left out |
+| `parameters` | see below; a number, or a table with `value`, `unit`, `std`, `source`, `knowledge` |
+| `effects`, `sensors` | physics and sensor errors beyond the nominal model ([effects](effects.md)) |
+| `prediction` | noise and way of a robot that is fitted to predictions; `identify` writes it |
+
+Nominal values of a link are for the given number of links; those below are for three. The order is that of the parameter
+vector in Python.
 """
 
 
