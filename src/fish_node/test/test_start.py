@@ -225,3 +225,32 @@ def test_the_environment_sets_the_walls_and_a_wrong_one_ends_the_program_in_one_
     assert wrong.returncode == 1
     assert wrong.stderr.startswith("FISH_POOL=three: expected sides in metres")
     assert wrong.stderr.count("\n") == 1
+
+
+ENDLESS = """
+from fish_node.nodes import start
+
+
+class Endless:
+    def destroy_node(self):
+        while True:
+            pass
+
+
+class Spin:
+    def init(self, arguments): ...
+
+    def __call__(self, nodes): ...
+
+
+start.END_S = 0.2
+start.run(Endless, "endless", spin=Spin())
+"""
+
+
+def test_a_process_whose_middleware_never_ends_ends_itself_and_says_where_it_stood():
+    ended = subprocess.run(
+        [sys.executable, "-c", ENDLESS], capture_output=True, text=True, timeout=60
+    )
+    assert ended.returncode == 1
+    assert "in destroy_node" in ended.stderr

@@ -24,11 +24,12 @@ from fish_hw.nodes.worker import Worker
 from fish_hw.transport.interfaces import TransportError
 from fish_node.nodes.executor import KeptWaitSetExecutor
 from fish_node.nodes.robot_clock import RobotClock
-from fish_node.nodes.start import read_parameters, shut_down
+from fish_node.nodes.start import ended_within, read_parameters, shut_down
 from fish_node.nodes.status_log import StatusLog
 
 NAMESPACE = "fish"
 END_TIMEOUT_S = 2.0
+MIDDLEWARE_END_S = 10.0
 CLOCK_WAIT_S = 0.01
 NO_CLOCK = (
     "use_sim_time is true, but there is no time on /clock: start the simulator, or set it to false"
@@ -239,8 +240,10 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
         if node is not None:
             node.close()
             failure = failure or node.failure
-            node.destroy_node()
-        shut_down()
+        with ended_within(MIDDLEWARE_END_S):  # the device is safe
+            if node is not None:
+                node.destroy_node()
+            shut_down()
     if failure:
         sys.exit(f"{name}: {failure}")
 

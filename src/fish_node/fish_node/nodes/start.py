@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every node does to start and to stop: parameters from a dataclass, a clean end."""
 
+import faulthandler
 import sys
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any, Generic, TypeVar
 
@@ -20,6 +22,7 @@ Config = TypeVar("Config")
 Made = TypeVar("Made", bound=Node)
 # of arguments, of parameters, of files that they name
 REFUSALS = (ValueError, OSError, RCLError, UnknownROSArgsError)
+END_S = 60.0  # s; a node's own way out, such as the rest of a recording, is in it
 
 
 def read_parameters(node: Node, kind: type[Config], settable: Collection[str] = ()) -> Config:
@@ -116,10 +119,25 @@ def run_together(
             raise
         return _refused(part.name, error)
     finally:
-        for node in nodes:
-            node.destroy_node()
-        shut_down()
+        with ended_within(END_S):
+            for node in nodes:
+                node.destroy_node()
+            shut_down()
     return 0
+
+
+@contextmanager
+def ended_within(limit_s: float) -> Iterator[None]:
+    """End the process with status 1, and where it stood on stderr, if what is done inside takes longer than limit_s.
+
+    Fast DDS sometimes never comes back from the end of its participant and keeps the interpreter's lock meanwhile, so that no
+    thread of Python could end the process (Fast-DDS issue 6502).
+    """
+    faulthandler.dump_traceback_later(limit_s, exit=True, file=sys.__stderr__)
+    try:
+        yield
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def shut_down() -> None:
