@@ -381,7 +381,11 @@ def test_steps_that_are_each_as_good_do_not_add_up_to_a_worse_model(swum: Experi
     assert not predicts_worse(settled, nominal, swum)
     assert not predicts_worse(surrogate, settled, swum)
     assert predicts_worse(surrogate, nominal, swum)
-    found = SimpleNamespace(nominal=nominal, settled=settled, surrogate=surrogate, unseen=swum)
+    search = {"final": nominal, "accepted": (), "task": SimpleNamespace(level=None)}
+    lawless = SimpleNamespace(law=SimpleNamespace(lawful=lambda _: ""))
+    found = SimpleNamespace(
+        nominal=nominal, settled=settled, surrogate=surrogate, unseen=swum, state=lawless, **search
+    )
     assert corrected(cast(Diagnosis, found)) is settled
 
 

@@ -19,9 +19,10 @@ from fish_sysid.dataset.synthetic import with_current, with_image_age
 from fish_sysid.diagnosis import pipeline
 from fish_sysid.diagnosis.can_follow import INTRINSIC, TOO_FAR, missed_by, missed_with
 from fish_sysid.diagnosis.conclusion import shares
-from fish_sysid.diagnosis.corrected_model import corrected
-from fish_sysid.diagnosis.diagnosis_json import answer
+from fish_sysid.diagnosis.corrected_model import by_symmetry, corrected, named
+from fish_sysid.diagnosis.diagnosis_json import answer, written
 from fish_sysid.diagnosis.latent_force import dof_shares
+from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 from fish_sysid.diagnosis.task import STAGES, make_task
 from fish_sysid.diagnosis.vocabulary import NoCandidateError, candidates
@@ -244,3 +245,22 @@ def test_of_two_effects_each_has_its_own_place():
     assert yaw["tether"] < 0.3
     assert set(parts["tether"][0].hypothesis.names) == {"hull_asymmetry"}
     assert shares(final, names[:1], experiment) == {}  # the refitted nominal model lacks it
+
+
+def test_what_only_symmetry_finds_stands_in_the_model_with_what_the_search_names() -> None:
+    """A flow that no candidate is bends the fit of the rudder's offset; with the symmetry's flow both are right."""
+    flow = {"x": 0.03, "y": -0.02}
+    data = swim(fish(current=flow, rudder_offset={"offset": 0.08}), duration=7.0)
+    result = pipeline.diagnose(data, GIVEN, names=("rudder_offset",))
+    assert [a.name for a in named(result)] == ["rudder_offset"]
+    estimates = {key: Estimate(value, 0.002, "m/s") for key, value in flow.items()}
+    found = SymmetryFinding("current", "physics", "found", "", "", parameters=estimates)
+    both = replace(result, settled=pipeline.with_symmetry_found(result, [found]))
+    assert by_symmetry(both) == ["current"]
+    fit = corrected(both)
+    assert fit is both.settled
+    assert fit.robot.effects["current"] == pytest.approx(flow)
+    wrong, right = (f.values["rudder_offset.offset"] for f in (result.final, fit))
+    assert abs(right - 0.08) < min(0.02, abs(wrong - 0.08))
+    assert written(both) == "with_symmetry"
+    assert pipeline.with_symmetry_found(result, [replace(found, name="rudder_offset")]) is None

@@ -411,7 +411,12 @@ def test_the_sentence_says_what_symmetry_finds_and_what_is_left():
     both = content(with_symmetry([by_search("tip_slip")], (WRITTEN_FLOW,), EFFECTS))
     both["fit"]["written"] = "with_effects"
     said = sentence({**both, "verdict": "missing_physics"})
-    assert said.endswith("model.yaml is without current, which no fit of a model shows.")
+    assert said.endswith("model.yaml is without current: not all of its numbers are known.")
+    both["fit"]["with_symmetry"] = {"effects": ["tip_slip", "current"]}
+    said = sentence({**both, "verdict": "missing_physics"})
+    assert said.endswith("model.yaml is without current: with it positions are predicted worse.")
+    both["fit"]["written"] = "with_symmetry"
+    assert "is without" not in sentence({**both, "verdict": "missing_physics"})
     named = content(with_symmetry([by_search("current")], (WRITTEN_FLOW,), EFFECTS))
     assert sentence({**named, "verdict": "missing_physics"}) == (
         "missing_physics: the model lacks current (x 0.028 ± 0.001 m/s; probability 0.97)."

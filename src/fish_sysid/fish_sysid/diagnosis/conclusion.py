@@ -25,11 +25,8 @@ from fish_sysid.estimation.map_fit import Fit, evaluate, initial_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 
-def conclude(state: State, settled: Fit | None, task: Task) -> Diagnosis:
-    """The diagnosis, with a surrogate model where no name fits.
-
-    settled: the nominal model refitted with what the symmetry tests find, if they find anything.
-    """
+def conclude(state: State, task: Task) -> Diagnosis:
+    """The diagnosis by the search alone."""
     training, nominal, final = task.trials.training, state.nominal, state.final
     names = [accepted.name for accepted in state.accepted]
     task.progress("locating the missing force")
@@ -42,16 +39,23 @@ def conclude(state: State, settled: Fit | None, task: Task) -> Diagnosis:
     unseen = task.experiment.select(task.split.held_out or task.split.training)
     noise = initial_noise(unseen, task.robot, nominal.noise)
     held = held_out_density(unseen, task.robot, noise, nominal, final)
-    found = Diagnosis(task, state, force, parts, wrenches, remaining, noise, held, settled=settled)
-    if named(found) or not much_is_left(found) or not task.runs("surrogate model"):
-        return found
-    structural = tuple(dict.fromkeys((*names, *(n for n in STRUCTURAL if n in task.names))))
+    return Diagnosis(task, state, force, parts, wrenches, remaining, noise, held)
+
+
+def with_surrogate(d: Diagnosis) -> Diagnosis:
+    """The diagnosis with a surrogate model, where no name fits and much is left."""
+    task = d.task
+    if named(d) or not much_is_left(d) or not task.runs("surrogate model"):
+        return d
+    accepted = [a.name for a in d.accepted]
+    structural = tuple(dict.fromkeys((*accepted, *(n for n in STRUCTURAL if n in task.names))))
     helpful = structural
     if task.runs("surrogate's own choice"):
         every = tuple(dict.fromkeys((*structural, *task.names)))
         helpful = task.kept("surrogate's own choice", structural, every)
-    model, asked = surrogate_model(settled or nominal, helpful, training, task.progress)
-    return task.kept("surrogate model", found, replace(found, surrogate=model, predicted=asked))
+    start = d.settled or d.nominal
+    model, asked = surrogate_model(start, helpful, task.trials.training, task.progress)
+    return task.kept("surrogate model", d, replace(d, surrogate=model, predicted=asked))
 
 
 def by_predictions(d: Diagnosis) -> Diagnosis:

@@ -90,20 +90,30 @@ def unexplained_share(d: Diagnosis) -> float:
     return float(left / (left + removed)) if left + removed > 0 else 0.0
 
 
+def of_search(d: Diagnosis) -> Fit:
+    """The model with the effects that the search names, or the refitted nominal one."""
+    return d.final if named(d) else d.nominal
+
+
+def by_symmetry(d: Diagnosis) -> list[str]:
+    """Effects and sensor errors that symmetry tests, and no fit, put into the model."""
+    if d.settled is None:
+        return []
+    new, old = d.settled.hypothesis.robot, of_search(d).hypothesis.robot
+    return [n for n in (*new.effects, *new.sensors) if n not in {**old.effects, **old.sensors}]
+
+
 def corrected(d: Diagnosis) -> Fit:
     """The fit that model.yaml holds: never one that predicts held-out trials worse than the refitted nominal model.
 
-    What symmetry tests find is in it where that does not predict worse.
+    It is the one with most in it that predicts none the worse for it: the surrogate, with what symmetry tests find, of the
+    search, the refitted nominal one.
     """
-    base = d.nominal
-    if d.settled is not None and not predicts_worse(d.settled, d.nominal, d.unseen):
-        base = d.settled
-    if d.surrogate is not None:
-        fit = d.surrogate
-    else:
-        fit = d.final if named(d) else base
-    others = [base] if base is d.nominal else [base, d.nominal]
-    return base if any(predicts_worse(fit, other, d.unseen) for other in others) else fit
+    fits = [fit for fit in (d.surrogate, d.settled, of_search(d), d.nominal) if fit is not None]
+    for k, fit in enumerate(fits):
+        if not any(predicts_worse(fit, less, d.unseen) for less in fits[k + 1 :]):
+            break
+    return fit
 
 
 def predicts_worse(fit: Fit, nominal: Fit, unseen: Experiment) -> bool:

@@ -13,6 +13,7 @@ from scipy import stats
 from fish_sim.robot import Robot
 from fish_sysid.diagnosis import latent_force
 from fish_sysid.diagnosis.corrected_model import (
+    by_symmetry,
     corrected,
     much_is_left,
     named,
@@ -216,10 +217,8 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
         "refitted": (d.nominal.robot, d.nominal.noise),
         "with_effects": (d.final.robot, d.final.noise),
     }
-    surrogate = d.surrogate and {
-        "effects": list(d.surrogate.hypothesis.names),  # a description, no findings
-        "rms": held_out_errors(d, d.surrogate.robot, d.surrogate.noise),
-    }
+    surrogate = d.surrogate and described(d, d.surrogate, d.surrogate.hypothesis.names)
+    settled = d.settled and described(d, d.settled, (*d.settled.hypothesis.names, *by_symmetry(d)))
     entries = {
         name: {
             "rms": held_out_errors(d, robot, noise),
@@ -234,6 +233,7 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
         "errors_are_of": "held_out" if d.task.split.held_out else "training",
         **entries,
         "written": written(d),
+        "with_symmetry": settled,  # the search's model with what only symmetry tests find
         "model_yaml": surrogate,  # where no name fits: the structure that predicts best over seconds
         "tail_links": {"given": d.task.robot.links, "used": d.final.robot.links},
         "noise_floor": {
@@ -244,6 +244,11 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
         "improvement_ci95": mean_interval(gain if d.task.split.held_out else gain[:0]),
         "residual_whiteness_p": {"before": whiteness(d.nominal), "after": whiteness(d.final)},
     }
+
+
+def described(d: Diagnosis, fit: Fit, names: Sequence[str]) -> dict[str, Any]:
+    """A model by its effects, which are a description and no findings, and its errors."""
+    return {"effects": list(names), "rms": held_out_errors(d, fit.robot, fit.noise)}
 
 
 def written(d: Diagnosis) -> str:

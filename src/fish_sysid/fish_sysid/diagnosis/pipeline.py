@@ -17,7 +17,8 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.backward_elimination import eliminate
 from fish_sysid.diagnosis.can_follow import missed_by
-from fish_sysid.diagnosis.conclusion import by_predictions, conclude
+from fish_sysid.diagnosis.conclusion import by_predictions, conclude, with_surrogate
+from fish_sysid.diagnosis.corrected_model import of_search
 from fish_sysid.diagnosis.forward_selection import Selection, select_effects
 from fish_sysid.diagnosis.model_order import better_order
 from fish_sysid.diagnosis.residual_regression import residual_law
@@ -25,7 +26,7 @@ from fish_sysid.diagnosis.result import Accepted, Diagnosis, State
 from fish_sysid.diagnosis.significance import Level
 from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
-from fish_sysid.diagnosis.symmetry.outcome import with_findings
+from fish_sysid.diagnosis.symmetry.outcome import beyond, with_findings
 from fish_sysid.diagnosis.task import Progress, Task, make_task
 from fish_sysid.diagnosis.vocabulary import start_hypothesis
 from fish_sysid.estimation.map_fit import Fit, evaluate
@@ -57,9 +58,9 @@ def diagnose(
     task.progress("fitting the nominal model")
     nominal = fit_nominal(task)
     state = searched(nominal, task) if misses is None else unsearched(nominal, task)
-    settled = with_symmetry_found(state, of_training(symmetry, task), task)
-    found = replace(conclude(state, settled, task), symmetry=symmetry, misses=misses)
-    return by_predictions(found)
+    found = replace(conclude(state, task), symmetry=symmetry, misses=misses)
+    found = replace(found, settled=with_symmetry_found(found, of_training(symmetry, task)))
+    return by_predictions(with_surrogate(found))
 
 
 def searched(nominal: Fit, task: Task) -> State:
@@ -88,21 +89,17 @@ def of_training(symmetry: Sequence[SymmetryFinding], task: Task) -> list[Symmetr
     return [own.get(f.name, f) if f.status == "found" else f for f in symmetry]
 
 
-def with_symmetry_found(
-    state: State, symmetry: Sequence[SymmetryFinding], task: Task
-) -> Fit | None:
-    """The nominal model refitted with what symmetry tests find and no fit has; None without any."""
-    nominal, final = state.nominal, state.final
-    lacking = [f for f in symmetry if f.name not in final.hypothesis.names]
-    robot = with_findings(nominal.hypothesis.robot, lacking)
-    if robot == nominal.hypothesis.robot:
+def with_symmetry_found(d: Diagnosis, symmetry: Sequence[SymmetryFinding]) -> Fit | None:
+    """The model of the search, refitted with what symmetry tests find and no fit has; None without any."""
+    base = of_search(d)
+    lacking = beyond(base.hypothesis.names, symmetry)
+    robot = with_findings(base.hypothesis.robot, lacking)
+    if robot == base.hypothesis.robot:
         return None
-    task.progress("refitting with what the symmetries show")
-    training = task.trials.training
-    start = evaluate(
-        replace(nominal.hypothesis, robot=robot), nominal.theta, training, nominal.noise
-    )
-    return refit_on(start, training)
+    d.task.progress("refitting with what the symmetries show")
+    training = d.task.trials.training
+    hypothesis = replace(base.hypothesis, robot=robot)
+    return refit_on(evaluate(hypothesis, base.theta, training, base.noise), training)
 
 
 def fit_nominal(task: Task) -> Fit:

@@ -84,7 +84,7 @@ class Diagnosis:
     surrogate: Fit | None = None  # where no name fits: the model that predicts best
     predicted: tuple[Named, ...] = ()  # effects of the surrogate, by trials left out
     symmetry: tuple[SymmetryFinding, ...] = ()  # every test's answer, without a model of the fish
-    settled: Fit | None = None  # the nominal model refitted with what the symmetry tests find
+    settled: Fit | None = None  # the search's model, refitted with what the symmetry tests find
     misses: float | None = None  # times the camera's noise, where the model cannot follow the fish
     still_misses: float | None = None  # the same with the names that predictions ask for
 

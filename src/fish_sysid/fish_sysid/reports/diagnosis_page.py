@@ -154,6 +154,12 @@ def _explains(shares: Mapping[str, float]) -> str:
     return f"Of the force that was missing without it (variance over that of the water's) acts {parts}."
 
 
+OTHER_MODELS = {
+    "with_symmetry": "with what symmetry tests find:",
+    "model_yaml": "fitted to predict over seconds, described with",
+}
+
+
 def _fit_table(content: Content, trials: str) -> Table:
     """Errors on `trials`; the gain with its interval, where more than one trial tells how far it spreads."""
     fit, rows = content["fit"], []
@@ -161,12 +167,10 @@ def _fit_table(content: Content, trials: str) -> Table:
         entry = fit[label]
         cells = [_errors(v) for v in entry["rms"].values()]
         rows.append([label.replace("_", " "), *cells, f"{entry[DENSITY]:.3f}"])
-    if fit["model_yaml"]:
-        cells = [_errors(v) for v in fit["model_yaml"]["rms"].values()]
-        helped = ", ".join(fit["model_yaml"]["effects"]) or "no effects"
-        rows.append(
-            [f"model.yaml: fitted to predict over seconds, described with {helped}", *cells, ""]
-        )
+    for key, label in OTHER_MODELS.items():
+        if fit.get(key):
+            cells = [_errors(v) for v in fit[key]["rms"].values()]
+            rows.append([f"{label} {', '.join(fit[key]['effects']) or 'no effects'}", *cells, ""])
     header = [
         "model",
         *(f"{h}: m / rad / m/s" for h in fit["nominal"]["rms"]),

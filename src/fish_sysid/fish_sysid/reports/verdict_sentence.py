@@ -31,10 +31,22 @@ def sentence(content: Content) -> str:
         parts.append(
             "model.yaml is the refitted nominal model: nothing that was found predicts held-out positions better."
         )
-    alone = [e["name"] for e in content["effects"] if by_symmetry(e)]
-    if content["fit"].get("written") == "with_effects" and alone:
-        parts.append(f"model.yaml is without {' and '.join(alone)}, which no fit of a model shows.")
+    parts += _not_written(content)
     return " ".join(parts)
+
+
+def _not_written(content: Content) -> list[str]:
+    """What only symmetry tests find, and model.yaml does not have."""
+    fit, alone = content["fit"], [e["name"] for e in content["effects"] if by_symmetry(e)]
+    if fit.get("written") not in ("with_effects", "with_symmetry"):
+        return []
+    tried = (fit.get("with_symmetry") or {"effects": []})["effects"]
+    missing = [name for name in alone if name not in tried]
+    parts = [f"{' and '.join(missing)}: not all of its numbers are known"] if missing else []
+    if fit["written"] == "with_effects" and len(missing) < len(alone):
+        known = [name for name in alone if name in tried]
+        parts.insert(0, f"{' and '.join(known)}: with it positions are predicted worse")
+    return [f"model.yaml is without {'; and without '.join(parts)}."] if parts else []
 
 
 def by_symmetry(effect: Content) -> bool:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -18,6 +18,9 @@ from fish_sysid.diagnosis.vocabulary import candidates, kind_of
 from fish_sysid.estimation.parametrization import EffectTable, effect_class
 
 FLOW = "current"
+CONTAINED_IN = {"current": "nonuniform_current"}  # a flow that varies has a mean
+
+Entry = dict[str, Any]
 
 
 def applicable(findings: Sequence[SymmetryFinding], robot: Robot) -> list[SymmetryFinding]:
@@ -29,6 +32,11 @@ def applicable(findings: Sequence[SymmetryFinding], robot: Robot) -> list[Symmet
         if f.name not in own
         and set(f.parameters) == set(effect_class(f.name, robot.table).parameters)
     ]
+
+
+def beyond(names: Collection[str], findings: Sequence[SymmetryFinding]) -> list[SymmetryFinding]:
+    """Findings that no effect of these names has in it."""
+    return [f for f in findings if not {f.name, CONTAINED_IN.get(f.name)} & set(names)]
 
 
 def with_findings(robot: Robot, findings: Sequence[SymmetryFinding]) -> Robot:
@@ -49,11 +57,6 @@ def in_still_water(experiment: Experiment, findings: Sequence[SymmetryFinding]) 
     if flow is None:
         return experiment
     return with_current(experiment, (-flow["x"].value, -flow["y"].value))
-
-
-Entry = dict[str, Any]
-
-CONTAINED_IN = {"current": "nonuniform_current"}  # a flow that varies has a mean
 
 
 def symmetry_entry(findings: Iterable[SymmetryFinding]) -> list[Entry]:
