@@ -23,6 +23,7 @@ Made = TypeVar("Made", bound=Node)
 # of arguments, of parameters, of files that they name
 REFUSALS = (ValueError, OSError, RCLError, UnknownROSArgsError)
 END_S = 60.0  # s; a node's own way out, such as the rest of a recording, is in it
+STDERR = 2  # file descriptor: sys.stderr may be anything
 
 
 def read_parameters(node: Node, kind: type[Config], settable: Collection[str] = ()) -> Config:
@@ -133,7 +134,7 @@ def ended_within(limit_s: float) -> Iterator[None]:
     Fast DDS sometimes never comes back from the end of its participant and keeps the interpreter's lock meanwhile, so that no
     thread of Python could end the process (Fast-DDS issue 6502).
     """
-    faulthandler.dump_traceback_later(limit_s, exit=True, file=sys.__stderr__)
+    faulthandler.dump_traceback_later(limit_s, exit=True, file=STDERR)
     try:
         yield
     finally:
