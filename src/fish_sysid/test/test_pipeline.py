@@ -50,10 +50,14 @@ def test_nothing_is_found_where_nothing_is(tmp_path):
 
 
 def test_a_tail_of_more_links_is_no_missing_physics(tmp_path):
-    result = pipeline.diagnose(swim(fish(2), duration=4.0), GIVEN, names=("quadratic_drag",))
+    said: list[str] = []
+    data = swim(fish(2), duration=4.0)
+    result = pipeline.diagnose(data, GIVEN, progress=said.append, names=("quadratic_drag",))
     content = answer(result)
     assert content["verdict"] == "no_mismatch"
     assert content["fit"]["tail_links"] == {"given": 1, "used": 2}
+    tried = [text for text in said if "tail links" in text]  # two leave no more than water
+    assert tried == ["fitting the nominal model with 2 tail links"]
     write_diagnosis_page(tmp_path / "report.html", "finer", content, result)
     assert "modelled with 2 links instead of 1" in (tmp_path / "report.html").read_text()
 

@@ -34,8 +34,7 @@ def better_order(selection: Selection, law: Law, task: Task) -> Fit | None:
     """
     trials, level, best = task.trials, task.level, selection.base
     nominal, searched = selection.rounds[0].base, trials.searched
-    much = best.largest_ratio >= RATIO_SUSPECT or law.lawful(level)
-    if not much and not residual_law(best, searched).lawful(level):
+    if not law.lawful(level) and not leaves_more(best, task):
         return None
     finer = max(finer_models(nominal, best, task), key=evidence, default=None)
     if finer is None or evidence(finer) < evidence(best):
@@ -58,16 +57,23 @@ def better_order(selection: Selection, law: Law, task: Task) -> Fit | None:
 
 
 def finer_models(nominal: Fit, best: Fit, task: Task) -> list[Fit]:
-    """Nominal models with more links, one after the other while they explain more or leave much less process noise."""
+    """Nominal models with more links, one after the other while they leave more than water and the next one promises more."""
     found: list[Fit] = []
     for links in (task.robot.links + more for more in MORE_LINKS):
         if links > MAX_LINKS:
             break
         task.progress(f"fitting the nominal model with {links} tail links")
         found.append(fit_links(links, nominal, best, task))
-        if not promises_more(found[-1], best):
+        if not promises_more(found[-1], best) or not leaves_more(found[-1], task):
             break
     return found
+
+
+def leaves_more(fit: Fit, task: Task) -> bool:
+    """Whether a fit leaves more than water does, or a law, in the searched trials."""
+    if fit.largest_ratio >= RATIO_SUSPECT:
+        return True
+    return bool(residual_law(fit, task.trials.searched).lawful(task.level))
 
 
 def fit_links(links: int, nominal: Fit, best: Fit, task: Task) -> Fit:
