@@ -167,6 +167,8 @@ def test_where_the_likelihood_was_asked_what_predictions_ask_for_is_no_effect():
     assert entry["evidence"]["cost_ratio"] == pytest.approx(0.4)
     assert entry["parameters"]["mobility"]["unit"] == "m/(N s)"
     assert prediction_effects(d) == []
+    d.surrogate = replace(d.surrogate, theta=np.zeros(len(d.surrogate.theta)))
+    assert prediction_entries(d) == []  # the last steps have taken all of its strength
     nothing = SimpleNamespace(surrogate=None, predicted=(), misses=None)
     assert prediction_entries(nothing) == prediction_effects(nothing) == []
 

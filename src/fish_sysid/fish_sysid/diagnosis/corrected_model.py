@@ -55,15 +55,20 @@ def named(d: Diagnosis) -> tuple[Accepted, ...]:
 
 
 def asked_by_predictions(d: Diagnosis) -> tuple[Named, ...]:
-    """Names and rivals that stand by predictions: only where the likelihood cannot be asked, and in no limit."""
-    if d.misses is None or d.surrogate is None:
+    """Names and rivals that stand by predictions: only where the likelihood cannot be asked."""
+    return standing(d) if d.misses is not None else ()
+
+
+def standing(d: Diagnosis) -> tuple[Named, ...]:
+    """What predictions ask for, less the names and rivals that in the surrogate are in a limit: another effect, or none."""
+    if d.surrogate is None:
         return ()
-    table, standing = d.task.robot.table, []
+    table, found = d.task.robot.table, []
     for asked in d.predicted:
         if not limit_in(d.surrogate, asked.step.name, d.task.robot):
             rivals = {k: v for k, v in asked.rivals.items() if not degenerate(k, v, table)}
-            standing.append(replace(asked, rivals=rivals))
-    return tuple(standing)
+            found.append(replace(asked, rivals=rivals))
+    return tuple(found)
 
 
 def refused(d: Diagnosis) -> list[str]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_sysid.diagnosis.corrected_model import asked_by_predictions
+from fish_sysid.diagnosis.corrected_model import asked_by_predictions, standing
 from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.result import Diagnosis
 from fish_sysid.diagnosis.symmetry.finding import Estimate
@@ -39,13 +39,11 @@ Entry = dict[str, Any]
 
 
 def prediction_entries(d: Diagnosis) -> list[Entry]:
-    """The effects of the surrogate model with their evidence, `basis` "prediction"; none where they are in `effects`.
+    """What predictions ask for where the likelihood gives no name, `basis` "prediction"; none where it cannot be asked.
 
     cost_ratio: cost of predicting trials left out with the effect over that of the control without it.
     """
-    if d.surrogate is None or d.misses is not None:
-        return []
-    return [_entry(d, asked) for asked in d.predicted]
+    return [_entry(d, asked) for asked in standing(d)] if d.misses is None else []
 
 
 def prediction_effects(d: Diagnosis) -> list[Entry]:
