@@ -19,11 +19,12 @@ from fish_sysid.dataset.synthetic import with_current, with_image_age
 from fish_sysid.diagnosis import pipeline
 from fish_sysid.diagnosis.can_follow import INTRINSIC, TOO_FAR, missed_by, missed_with
 from fish_sysid.diagnosis.conclusion import shares
-from fish_sysid.diagnosis.corrected_model import by_symmetry, corrected, named
-from fish_sysid.diagnosis.diagnosis_json import answer, written
+from fish_sysid.diagnosis.corrected_model import corrected, named
+from fish_sysid.diagnosis.diagnosis_json import answer
 from fish_sysid.diagnosis.latent_force import dof_shares
 from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
+from fish_sysid.diagnosis.symmetry.outcome import beyond
 from fish_sysid.diagnosis.task import STAGES, make_task
 from fish_sysid.diagnosis.vocabulary import NoCandidateError, candidates
 from fish_sysid.estimation.ekf_types import Noise
@@ -251,8 +252,8 @@ def test_of_two_effects_each_has_its_own_place():
     assert shares(final, names[:1], experiment) == {}  # the refitted nominal model lacks it
 
 
-def test_what_only_symmetry_finds_stands_in_the_model_with_what_the_search_names() -> None:
-    """A flow that no candidate is bends the fit of the rudder's offset; with the symmetry's flow both are right."""
+def test_what_only_symmetry_finds_stands_in_the_model_with_what_the_search_names(tmp_path) -> None:
+    """A flow, which is no candidate here, bends the fit of the rudder's offset; with the symmetry's flow both are right."""
     flow = {"x": 0.03, "y": -0.02}
     data = swim(fish(current=flow, rudder_offset={"offset": 0.08}), duration=7.0)
     result = pipeline.diagnose(data, GIVEN, names=("rudder_offset",))
@@ -260,11 +261,18 @@ def test_what_only_symmetry_finds_stands_in_the_model_with_what_the_search_names
     estimates = {key: Estimate(value, 0.002, "m/s") for key, value in flow.items()}
     found = SymmetryFinding("current", "physics", "found", "", "", parameters=estimates)
     both = replace(result, settled=pipeline.with_symmetry_found(result, [found]))
-    assert by_symmetry(both) == ["current"]
     fit = corrected(both)
     assert fit is both.settled
     assert fit.robot.effects["current"] == pytest.approx(flow)
     wrong, right = (f.values["rudder_offset.offset"] for f in (result.final, fit))
     assert abs(right - 0.08) < min(0.02, abs(wrong - 0.08))
-    assert written(both) == "with_symmetry"
-    assert pipeline.with_symmetry_found(result, [replace(found, name="rudder_offset")]) is None
+    content = answer(both)
+    assert content["fit"]["written"] == "with_symmetry"
+    assert content["fit"]["with_symmetry"]["effects"] == ["current", "rudder_offset"]
+    (effect,) = content["effects"]  # its numbers are those of model.yaml
+    assert effect["parameters"]["offset"]["value"] == right
+    write_diagnosis_page(tmp_path / "report.html", "both", content, both)
+    page = (tmp_path / "report.html").read_text()
+    assert "with what symmetry tests find, in all current, rudder_offset (model.yaml)" in page
+    assert beyond(("nonuniform_current",), [found]) == []  # a flow that varies has a mean
+    assert beyond(("tip_slip",), [found]) == [found]

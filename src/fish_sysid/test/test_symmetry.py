@@ -409,13 +409,25 @@ def test_the_sentence_says_what_symmetry_finds_and_what_is_left():
         "unexplained: yaw = (0.001) cos(heading)."
     )
     both = content(with_symmetry([by_search("tip_slip")], (WRITTEN_FLOW,), EFFECTS))
-    both["fit"]["written"] = "with_effects"
+    both["fit"] |= {"written": "with_effects", "holds": ["tip_slip"]}
     said = sentence({**both, "verdict": "missing_physics"})
     assert said.endswith("model.yaml is without current: not all of its numbers are known.")
     both["fit"]["with_symmetry"] = {"effects": ["tip_slip", "current"]}
     said = sentence({**both, "verdict": "missing_physics"})
     assert said.endswith("model.yaml is without current: with it positions are predicted worse.")
-    both["fit"]["written"] = "with_symmetry"
+    both["fit"]["holds"] = []
+    said = sentence({**both, "verdict": "missing_physics"})
+    assert said.endswith("without tip_slip and current: with them positions are predicted worse.")
+    both["fit"]["written"] = "refitted"
+    said = sentence({**both, "verdict": "missing_physics"})
+    assert said.endswith("nothing that was found predicts held-out positions better.")
+    said = sentence(
+        content(with_symmetry([], (WRITTEN_FLOW,), EFFECTS))
+        | {"verdict": "no_mismatch", "ranking": []}
+        | {"fit": {**both["fit"], "with_symmetry": None}}
+    )
+    assert said.endswith("model.yaml is without current: not all of its numbers are known.")
+    both["fit"]["holds"] = ["tip_slip", "current"]
     assert "is without" not in sentence({**both, "verdict": "missing_physics"})
     named = content(with_symmetry([by_search("current")], (WRITTEN_FLOW,), EFFECTS))
     assert sentence({**named, "verdict": "missing_physics"}) == (

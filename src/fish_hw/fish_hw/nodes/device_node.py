@@ -240,12 +240,14 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
         if node is not None:
             node.close()
             failure = failure or node.failure
+        if failure:
+            print(f"{name}: {failure}", file=sys.stderr, flush=True)
         with ended_within(MIDDLEWARE_END_S):  # the device is safe
             if node is not None:
                 node.destroy_node()
             shut_down()
     if failure:
-        sys.exit(f"{name}: {failure}")
+        sys.exit(1)
 
 
 def one_line(error: Exception) -> str:

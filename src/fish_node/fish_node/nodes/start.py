@@ -129,7 +129,7 @@ def run_together(
 
 @contextmanager
 def ended_within(limit_s: float) -> Iterator[None]:
-    """End the process with status 1, and where it stood on stderr, if what is done inside takes longer than limit_s.
+    """End the process with status 1, and say on stderr where it stood, if what is done inside takes longer than limit_s.
 
     Fast DDS sometimes never comes back from the end of its participant and keeps the interpreter's lock meanwhile, so that no
     thread of Python could end the process (Fast-DDS issue 6502).

@@ -60,7 +60,7 @@ def asked_by_predictions(d: Diagnosis) -> tuple[Named, ...]:
 
 
 def standing(d: Diagnosis) -> tuple[Named, ...]:
-    """What predictions ask for, less the names and rivals that in the surrogate are in a limit: another effect, or none."""
+    """What predictions ask for, less the names and rivals whose values are those of another effect, or of none."""
     if d.surrogate is None:
         return ()
     table, found = d.task.robot.table, []
@@ -96,16 +96,10 @@ def unexplained_share(d: Diagnosis) -> float:
 
 
 def of_search(d: Diagnosis) -> Fit:
-    """The model with the effects that the search names, or the refitted nominal one."""
-    return d.final if named(d) else d.nominal
-
-
-def by_symmetry(d: Diagnosis) -> list[str]:
-    """Effects and sensor errors that symmetry tests, and no fit, put into the model."""
-    if d.settled is None:
-        return []
-    new, old = d.settled.hypothesis.robot, of_search(d).hypothesis.robot
-    return [n for n in (*new.effects, *new.sensors) if n not in {**old.effects, **old.sensors}]
+    """The model with the effects that the search names, or the refitted nominal one where that predicts better."""
+    if named(d) and not predicts_worse(d.final, d.nominal, d.unseen):
+        return d.final
+    return d.nominal
 
 
 def corrected(d: Diagnosis) -> Fit:

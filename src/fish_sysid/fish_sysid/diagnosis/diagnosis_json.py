@@ -13,7 +13,6 @@ from scipy import stats
 from fish_sim.robot import Robot
 from fish_sysid.diagnosis import latent_force
 from fish_sysid.diagnosis.corrected_model import (
-    by_symmetry,
     corrected,
     much_is_left,
     named,
@@ -47,8 +46,8 @@ STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in sur
 
 def answer(d: Diagnosis) -> dict[str, Any]:
     """The dictionary written to diagnosis.json."""
-    unexplained = unexplained_entry(d)
-    effects = [*(effect_entry(d, a) for a in named(d)), *prediction_effects(d)]
+    unexplained, fit = unexplained_entry(d), corrected(d)
+    effects = [*(effect_entry(d, a, fit) for a in named(d)), *prediction_effects(d)]
     stated = [[e["name"], *(rival["name"] for rival in e["rivals"])] for e in effects]
     grows_with = next((c["name"] for c in unexplained["where"].get("covariates", [])), None)
     return {
@@ -56,7 +55,7 @@ def answer(d: Diagnosis) -> dict[str, Any]:
         "effects": with_symmetry(effects, d.symmetry, d.task.robot.table),
         "symmetry": symmetry_entry(d.symmetry),
         "unexplained": unexplained,
-        "fit": fit_entry(d),
+        "fit": fit_entry(d, fit),
         "next_experiment": separating(stated)
         or next_experiment([a.name for a in named(d)], rivals(d), grows_with),
         "out_of_reach": d.task.not_judged,
@@ -83,8 +82,8 @@ def refitted_entry(d: Diagnosis, first: Round, name: str, fit: Fit) -> dict[str,
     }
 
 
-def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
-    """One found effect."""
+def effect_entry(d: Diagnosis, accepted: Accepted, fit: Fit) -> dict[str, Any]:
+    """One found effect, with the numbers of model.yaml, whose fit this is, if it stands there."""
     name, found = accepted.name, accepted.round
     gains = {a.name: a.round.gain(a.name) for a in d.accepted}
     probability = competition(accepted, d.accepted)
@@ -93,7 +92,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
         "name": name,
         "kind": kind_of(name, d.task.robot.table),
         "equation": effect.equation,
-        "parameters": effect_parameters(d.final, name),
+        "parameters": effect_parameters(fit if name in fit.hypothesis.names else d.final, name),
         "evidence": {
             "basis": "likelihood",
             "log_likelihood_gain": gains[name],
@@ -210,15 +209,15 @@ def law(d: Diagnosis, dof: str) -> str:
     return f"{dof} = {terms} (SI units; {d.state.law.gain[dof]:.0f} nats on trials that it was not fitted to)"
 
 
-def fit_entry(d: Diagnosis) -> dict[str, Any]:
-    """Prediction errors and log density on held-out trials (where there are none, training trials), before and after."""
+def fit_entry(d: Diagnosis, fit: Fit) -> dict[str, Any]:
+    """Errors and log density on held-out trials (or training trials), before and after; fit: that model.yaml holds."""
     robots = {
         "nominal": (d.task.robot, d.given_noise),
         "refitted": (d.nominal.robot, d.nominal.noise),
         "with_effects": (d.final.robot, d.final.noise),
     }
     surrogate = d.surrogate and described(d, d.surrogate, d.surrogate.hypothesis.names)
-    settled = d.settled and described(d, d.settled, (*d.settled.hypothesis.names, *by_symmetry(d)))
+    settled = d.settled and described(d, d.settled, d.settled.hypothesis.names)
     entries = {
         name: {
             "rms": held_out_errors(d, robot, noise),
@@ -232,7 +231,8 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
         # the trials of every rms and density, `held_out_rms` of `refitted` included: too few trials hold none out
         "errors_are_of": "held_out" if d.task.split.held_out else "training",
         **entries,
-        "written": written(d),
+        "written": written(d, fit),
+        "holds": list(fit.hypothesis.names),  # effects and sensor errors in model.yaml
         "with_symmetry": settled,  # the search's model with what only symmetry tests find
         "model_yaml": surrogate,  # where no name fits: the structure that predicts best over seconds
         "tail_links": {"given": d.task.robot.links, "used": d.final.robot.links},
@@ -251,9 +251,8 @@ def described(d: Diagnosis, fit: Fit, names: Sequence[str]) -> dict[str, Any]:
     return {"effects": list(names), "rms": held_out_errors(d, fit.robot, fit.noise)}
 
 
-def written(d: Diagnosis) -> str:
-    """Which model model.yaml holds: refitted, with_symmetry, with_effects or model_yaml."""
-    fit = corrected(d)
+def written(d: Diagnosis, fit: Fit) -> str:
+    """Which model model.yaml holds, as it holds this fit: refitted, with_symmetry, with_effects or model_yaml."""
     if fit is d.nominal:
         return "refitted"
     if fit is d.settled:

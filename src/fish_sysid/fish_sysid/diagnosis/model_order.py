@@ -34,9 +34,10 @@ def better_order(selection: Selection, law: Law, task: Task) -> Fit | None:
     """
     trials, level, best = task.trials, task.level, selection.base
     nominal, searched = selection.rounds[0].base, trials.searched
-    if not law.lawful(level) and not leaves_more(best, task):
+    seen = leaves_more(best, task)
+    if not seen and not law.lawful(level):
         return None
-    finer = max(finer_models(nominal, best, task), key=evidence, default=None)
+    finer = max(finer_models(nominal, best, seen, task), key=evidence, default=None)
     if finer is None or evidence(finer) < evidence(best):
         return None
     needed = level.needed(nominal.samples, 1, len(MORE_LINKS))
@@ -56,15 +57,18 @@ def better_order(selection: Selection, law: Law, task: Task) -> Fit | None:
     return finer
 
 
-def finer_models(nominal: Fit, best: Fit, task: Task) -> list[Fit]:
-    """Nominal models with more links, one after the other while they leave more than water and the next one promises more."""
+def finer_models(nominal: Fit, best: Fit, seen: bool, task: Task) -> list[Fit]:
+    """Nominal models with more links, one after the other while each leaves more than water, and is better or nearly right.
+
+    seen: whether the searched trials show what the best model leaves; else they cannot show what a finer one leaves.
+    """
     found: list[Fit] = []
     for links in (task.robot.links + more for more in MORE_LINKS):
         if links > MAX_LINKS:
             break
         task.progress(f"fitting the nominal model with {links} tail links")
         found.append(fit_links(links, nominal, best, task))
-        if not promises_more(found[-1], best) or not leaves_more(found[-1], task):
+        if not promises_more(found[-1], best) or (seen and not leaves_more(found[-1], task)):
             break
     return found
 

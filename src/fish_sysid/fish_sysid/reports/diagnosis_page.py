@@ -155,7 +155,7 @@ def _explains(shares: Mapping[str, float]) -> str:
 
 
 OTHER_MODELS = {
-    "with_symmetry": "with what symmetry tests find:",
+    "with_symmetry": "with what symmetry tests find, in all",
     "model_yaml": "fitted to predict over seconds, described with",
 }
 
@@ -166,11 +166,13 @@ def _fit_table(content: Content, trials: str) -> Table:
     for label in ("nominal", "refitted", "with_effects"):
         entry = fit[label]
         cells = [_errors(v) for v in entry["rms"].values()]
-        rows.append([label.replace("_", " "), *cells, f"{entry[DENSITY]:.3f}"])
+        said = f"{label.replace('_', ' ')}{_marked(fit, label)}"
+        rows.append([said, *cells, f"{entry[DENSITY]:.3f}"])
     for key, label in OTHER_MODELS.items():
         if fit.get(key):
             cells = [_errors(v) for v in fit[key]["rms"].values()]
-            rows.append([f"{label} {', '.join(fit[key]['effects']) or 'no effects'}", *cells, ""])
+            said = f"{label} {', '.join(fit[key]['effects']) or 'no effects'}{_marked(fit, key)}"
+            rows.append([said, *cells, ""])
     header = [
         "model",
         *(f"{h}: m / rad / m/s" for h in fit["nominal"]["rms"]),
@@ -182,6 +184,11 @@ def _fit_table(content: Content, trials: str) -> Table:
     held = ", ".join(fit["held_out_trials"]) or "none"
     note = f"Held out: {held}. {NAT} Gain of the effects over the refitted model: {gain}{spread}."
     return Table(f"Prediction errors on {trials}, before and after", header, rows, note)
+
+
+def _marked(fit: Content, key: str) -> str:
+    """Says which row is the model of model.yaml."""
+    return " (model.yaml)" if fit.get("written") == key else ""
 
 
 def _errors(rms: Mapping[str, float]) -> str:

@@ -10,6 +10,7 @@ from fish_sysid.diagnosis.vocabulary import candidates
 
 Content = dict[str, Any]
 
+NOTHING_BETTER = "model.yaml is the refitted nominal model: nothing that was found predicts held-out positions better."
 MOST_NUMBERS = 4  # of an effect, each stated
 
 
@@ -27,26 +28,27 @@ def sentence(content: Content) -> str:
         parts.append(
             f"The tail is modelled with {links['used']} links instead of {links['given']}."
         )
-    if content["fit"].get("written") == "refitted" and content["verdict"] != "no_mismatch":
-        parts.append(
-            "model.yaml is the refitted nominal model: nothing that was found predicts held-out positions better."
-        )
     parts += _not_written(content)
     return " ".join(parts)
 
 
 def _not_written(content: Content) -> list[str]:
-    """What only symmetry tests find, and model.yaml does not have."""
-    fit, alone = content["fit"], [e["name"] for e in content["effects"] if by_symmetry(e)]
-    if fit.get("written") not in ("with_effects", "with_symmetry"):
+    """What was found and is not in model.yaml, and why."""
+    fit = content["fit"]
+    if "holds" not in fit:
         return []
     tried = (fit.get("with_symmetry") or {"effects": []})["effects"]
-    missing = [name for name in alone if name not in tried]
-    parts = [f"{' and '.join(missing)}: not all of its numbers are known"] if missing else []
-    if fit["written"] == "with_effects" and len(missing) < len(alone):
-        known = [name for name in alone if name in tried]
-        parts.insert(0, f"{' and '.join(known)}: with it positions are predicted worse")
-    return [f"model.yaml is without {'; and without '.join(parts)}."] if parts else []
+    absent = [e for e in content["effects"] if e["name"] not in fit["holds"]]
+    unknown = [e["name"] for e in absent if by_symmetry(e) and e["name"] not in tried]
+    worse = [e["name"] for e in absent if e["name"] not in unknown]
+    said = []
+    if fit["written"] == "refitted" and content["verdict"] != "no_mismatch":
+        worse, said = [], [NOTHING_BETTER]
+    them, their = "them" if len(worse) > 1 else "it", "their" if len(unknown) > 1 else "its"
+    parts = [f"{' and '.join(worse)}: with {them} positions are predicted worse"] if worse else []
+    if unknown:
+        parts.append(f"{' and '.join(unknown)}: not all of {their} numbers are known")
+    return said + ([f"model.yaml is without {'; and without '.join(parts)}."] if parts else [])
 
 
 def by_symmetry(effect: Content) -> bool:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from fish_sim.robot import Robot
@@ -20,12 +21,13 @@ from fish_sysid.diagnosis.symmetry.stroke_means import stroke_means
 
 REGRESSIONS = (UNIFORM_FLOW, GYRO_SCALE, HEADING_OFFSET, VARYING_FLOW, WALL_EFFECT, PATCH, MIRROR)
 GIVEN = "the given robot has it, and its values are refitted"
+CONTAINED_IN = {"current": "nonuniform_current"}  # a flow that varies has a mean
 
 
 def symmetry_findings(experiment: Experiment, robot: Robot) -> tuple[SymmetryFinding, ...]:
     """Every test's answer. Images are first moved back by the delay that camera and gyro show.
 
-    An effect or sensor error that the given robot already has is found as any other, with that as `reason`.
+    What the given robot already has is found as any other, with that as `reason`.
     """
     alignment = align(experiment)
     timed = moved_back(experiment, alignment.delay)
@@ -36,5 +38,11 @@ def symmetry_findings(experiment: Experiment, robot: Robot) -> tuple[SymmetryFin
     findings = (flow, *clocks, gyro, scale, *marker_or_imu(marker, axes), *others)
     own = {*robot.effects, *robot.sensors}
     return tuple(
-        replace(f, reason=GIVEN) if f.status == "found" and f.name in own else f for f in findings
+        replace(f, reason=GIVEN) if f.status == "found" and in_any(f.name, own) else f
+        for f in findings
     )
+
+
+def in_any(name: str, names: Collection[str]) -> bool:
+    """Whether one of the names is this one, or has it in it."""
+    return name in names or CONTAINED_IN.get(name) in names

@@ -13,12 +13,11 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.synthetic import with_current
 from fish_sysid.diagnosis.symmetry.finding import Estimate, Evidence, SymmetryFinding
-from fish_sysid.diagnosis.symmetry.findings import GIVEN
+from fish_sysid.diagnosis.symmetry.findings import CONTAINED_IN, GIVEN, in_any
 from fish_sysid.diagnosis.vocabulary import candidates, kind_of
 from fish_sysid.estimation.parametrization import EffectTable, effect_class
 
 FLOW = "current"
-CONTAINED_IN = {"current": "nonuniform_current"}  # a flow that varies has a mean
 
 Entry = dict[str, Any]
 
@@ -36,7 +35,7 @@ def applicable(findings: Sequence[SymmetryFinding], robot: Robot) -> list[Symmet
 
 def beyond(names: Collection[str], findings: Sequence[SymmetryFinding]) -> list[SymmetryFinding]:
     """Findings that no effect of these names has in it."""
-    return [f for f in findings if not {f.name, CONTAINED_IN.get(f.name)} & set(names)]
+    return [f for f in findings if not in_any(f.name, names)]
 
 
 def with_findings(robot: Robot, findings: Sequence[SymmetryFinding]) -> Robot:
