@@ -216,8 +216,8 @@ def fit_entry(d: Diagnosis, fit: Fit) -> dict[str, Any]:
         "refitted": (d.nominal.robot, d.nominal.noise),
         "with_effects": (d.final.robot, d.final.noise),
     }
-    surrogate = d.surrogate and described(d, d.surrogate, d.surrogate.hypothesis.names)
-    settled = d.settled and described(d, d.settled, d.settled.hypothesis.names)
+    surrogate = d.surrogate and described(d, d.surrogate)
+    settled = d.settled and described(d, d.settled)
     entries = {
         name: {
             "rms": held_out_errors(d, robot, noise),
@@ -246,9 +246,12 @@ def fit_entry(d: Diagnosis, fit: Fit) -> dict[str, Any]:
     }
 
 
-def described(d: Diagnosis, fit: Fit, names: Sequence[str]) -> dict[str, Any]:
+def described(d: Diagnosis, fit: Fit) -> dict[str, Any]:
     """A model by its effects, which are a description and no findings, and its errors."""
-    return {"effects": list(names), "rms": held_out_errors(d, fit.robot, fit.noise)}
+    return {
+        "effects": list(fit.hypothesis.names),
+        "rms": held_out_errors(d, fit.robot, fit.noise),
+    }
 
 
 def written(d: Diagnosis, fit: Fit) -> str:
