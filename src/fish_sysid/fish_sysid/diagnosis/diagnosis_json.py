@@ -248,10 +248,8 @@ def fit_entry(d: Diagnosis, fit: Fit) -> dict[str, Any]:
 
 def described(d: Diagnosis, fit: Fit) -> dict[str, Any]:
     """A model by its effects, which are a description and no findings, and its errors."""
-    return {
-        "effects": list(fit.hypothesis.names),
-        "rms": held_out_errors(d, fit.robot, fit.noise),
-    }
+    rms = held_out_errors(d, fit.robot, fit.noise)
+    return {"effects": list(fit.hypothesis.names), "rms": rms}
 
 
 def written(d: Diagnosis, fit: Fit) -> str:
