@@ -110,6 +110,7 @@ FAKE = (
 
 # s, of a robot that hurts nobody: as the node simulator
 BORNE = {"odometry_timeout_s": 0.5, "camera_timeout_s": 1.0, "pause_s": 1.0, "stale_s": 1.0}
+BORNE_BY_RUDDER = {"stale_s": 1.0, "armed_timeout_s": 1.0}
 
 # A simulator whose clock all nodes follow: time waits for nodes that lag by more than slack [s of simulated time], for so long
 # [s of real time]. The camera's poses are late by its own delay, one lost picture, and the tracker; a fake robot says itself how
@@ -160,7 +161,7 @@ def fake_parameters(devices: Path) -> dict[NodeSpec, dict[str, object]]:
         fake_robot: {"folder": str(devices)},
         simulator: {"estimate": "ignored"},
         rotor: {"port": str(devices / "rotor"), "battery_cells": 3, **BORNE},
-        rudder: {"chip": str(devices / "pwmchip0")},
+        rudder: {"chip": str(devices / "pwmchip0"), **BORNE_BY_RUDDER},
         imu: {"bus": f"unix:{devices / 'i2c'}"},
         camera: {"device": f"unix:{devices / 'camera'}", "calibration_file": str(lens)},
     }

@@ -127,8 +127,8 @@ class RudderSettings:
     max_us: float = 2000.0  # us, mechanical stop
     max_angle: float = 0.8  # rad, limit of alpha
     max_rate: float = 6.0  # rad/s, slew limit of alpha
-    stale_s: float = 0.25  # s without a command until the rudder goes to the centre
-    armed_timeout_s: float = 0.2  # s without arming/state until the rudder goes to the centre
+    stale_s: float = 0.25  # s without a command until it centres and disarms the robot
+    armed_timeout_s: float = 0.2  # s without arming/state until it centres and disarms the robot
     off_at_exit: bool = (
         True  # pulses off after centring; some digital servos hold their place all the same
     )

@@ -125,6 +125,27 @@ def test_a_servo_that_hears_nothing_of_the_arming_state_centres():
     assert "no arming/state for 0.2 s" in bench.servo.idle(bench.now)
 
 
+def test_a_servo_that_stopped_by_itself_stays_in_the_centre_until_it_was_disarmed():
+    bench = ServoBench()
+    bench.run(1.0, 0.6)
+    for _ in range(60):
+        bench.servo.armed(True, bench.now)
+        bench.servo.step(bench.now)
+        bench.now += DT
+    assert "no command for 0.25 s" in bench.servo.stop
+    assert bench.run(1.0, 0.6)[-1] == 0.0
+    bench.servo.armed(False, bench.now)
+    assert bench.servo.stop == ""
+    assert bench.run(1.0, 0.6)[-1] == pytest.approx(0.6)
+
+
+def test_a_servo_that_never_followed_may_wait_for_its_first_command():
+    bench = ServoBench()
+    bench.run(1.0)
+    assert bench.servo.stop == ""
+    assert bench.run(1.0, 0.6)[-1] == pytest.approx(0.6)
+
+
 def test_a_late_cycle_earns_no_jump():
     bench = ServoBench()
     bench.run(0.1, 0.0)
@@ -401,6 +422,9 @@ def test_driver_starts_centred_and_follows(chip):
     assert chip.read("duty_cycle") == 1_500_000
     assert bench.driver.status().level == WARN
     assert bench.events == ["rudder follows commands", "rudder centred: no command for 0.25 s"]
+    assert bench.driver.trouble == "no command for 0.25 s"  # the owner of the arming state disarms
+    bench.driver.armed(False)
+    assert bench.driver.trouble == ""
 
 
 @BOTH_WAYS

@@ -31,16 +31,23 @@ class RudderCounters:
 
 
 class RudderServo:
-    """Turns commands into pulses; times in s of one monotonic clock."""
+    """Turns commands into pulses; times in s of one monotonic clock.
+
+    Attributes:
+        stop: why the rudder ceased to follow commands although nobody disarmed it; it stays at the centre until somebody does.
+            Empty otherwise.
+    """
 
     def __init__(self, settings: RudderSettings) -> None:
         self.counters = RudderCounters()
         self.alpha = 0.0  # rad, sent last
+        self.stop = ""
         self._settings = settings
         self._target = 0.0
         self._target_time: float | None = None
         self._armed_time: float | None = None
         self._last_step: float | None = None
+        self._following = False
 
     def command(self, alpha: float, now: float) -> None:
         """Take a commanded angle [rad]; numbers that are none are rejected and counted."""
@@ -55,11 +62,15 @@ class RudderServo:
     def armed(self, armed: bool, now: float) -> None:
         """Take the word of the arming state's owner."""
         self._armed_time = now if armed else None
+        if not armed:
+            self.stop, self._following = "", False
 
     def idle(self, now: float) -> str:
         """Why the rudder does not follow commands; empty if it does."""
         if self._armed_time is None:
             return "disarmed"
+        if self.stop:
+            return self.stop
         if now - self._armed_time > self._settings.armed_timeout_s:
             return f"no arming/state for {self._settings.armed_timeout_s:g} s"
         if self._target_time is None or now - self._target_time > self._settings.stale_s:
@@ -71,7 +82,11 @@ class RudderServo:
         since = 0.0 if self._last_step is None else now - self._last_step
         dt = min(max(since, 0.0), LONGEST_STEP_S)
         self._last_step = now
-        target = 0.0 if self.idle(now) else self._target
+        idle = self.idle(now)
+        if idle and self._following:
+            self.stop = idle
+        self._following = not idle
+        target = 0.0 if idle else self._target
         most = self._settings.max_rate * dt
         self.alpha += min(max(target - self.alpha, -most), most)
         return self.pulse_ns(self.alpha)
@@ -113,7 +128,10 @@ class PwmOutput(Protocol):
 
 
 class RudderDriver:
-    """Follows commands while the robot is armed; centres when it is not, when they stop, at the start and at the end."""
+    """Follows commands while the robot is armed; centres when it is not, when they stop, at the start and at the end.
+
+    A silence of the commands or of the arming state is a trouble: the owner of the arming state disarms the robot.
+    """
 
     def __init__(
         self,
@@ -170,8 +188,8 @@ class RudderDriver:
 
     @property
     def trouble(self) -> str:
-        """Why the rudder cannot steer; empty while its output works."""
-        return "" if self._output is not None else self._link.trouble or "output lost"
+        """Why the rudder cannot steer; empty while its output works and it has not stopped by itself."""
+        return self.servo.stop if self._output is not None else self._link.trouble or "output lost"
 
     def step(self) -> list[str]:
         """One cycle; returns events worth a line in the log."""
