@@ -118,6 +118,7 @@ class ControllerConfig:
     target_timeout: float = 0.15  # s
     largest_variance: float = LARGEST_VARIANCE  # of an estimate that is not lost
     resume_delay: float = 0.2  # s, how long all must be well until the fish swims on after a pause
+    arming_required: bool = True  # false: swim also while nobody publishes arming/state
     gains_lowest: tuple[float, ...] = (
         *(0.0,) * 6,  # least gains: steering Kp, Ki, Kd, then speed Kp, Ki, Kd
     )
@@ -175,6 +176,7 @@ class ExciterConfig:
     margin: float = 0.15  # m, nearer to a wall the fish must not be then
     odometry_timeout: float = 0.5  # s
     largest_variance: float = LARGEST_VARIANCE  # of an estimate that is not lost
+    arming_required: bool = True  # false: swim also while nobody publishes arming/state
 
     def __post_init__(self) -> None:
         require_range("begin", self.begin, 0.0, 3600.0, "s")

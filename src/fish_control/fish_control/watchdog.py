@@ -36,9 +36,7 @@ class Health:
 
     estimate: EstimateHealth | None
     target_age: float | None  # s since the stamp
-    disarmed: str = (
-        ""  # why the robot is disarmed; empty while it is armed, or where nobody arms it
-    )
+    disarmed: str = ""  # why the robot is not armed; empty while it may move
 
 
 class Watchdog:

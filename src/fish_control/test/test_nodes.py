@@ -131,6 +131,8 @@ def bench(graph, tmp_path):
     made = []
 
     def make(kind, **parameters):
+        if kind in (ControllerNode, ExciterNode):
+            parameters = {"arming_required": False, **parameters}
         if kind is PlannerNode:
             parameters = {"state_file": str(tmp_path / "progress.json"), **parameters}
         made.append(Bench(kind, **parameters))
@@ -752,6 +754,16 @@ def commands(b, count):
     return np.array([(m.position[0], m.velocity[0], m.position[1]) for m in newest])
 
 
+def test_controller_is_at_rest_until_somebody_says_that_the_robot_is_armed(bench):
+    b = controller_bench(bench, arming_required=True)
+    drive(b, 1.5)
+    b.until(lambda: b.said(b"\x01", "disarmed: no arming/state yet"))
+    np.testing.assert_allclose(commands(b, 20)[:, 1:], 0.0)
+    arm(b)
+    drive(b, 1.5)
+    assert np.abs(commands(b, 60)[:, 1]).max() > 20.0
+
+
 def test_controller_streams_named_commands_and_labelled_gains(bench):
     b = controller_bench(bench)
     drive(b, 1.5)
@@ -973,16 +985,19 @@ def test_exciter_stops_for_good_where_the_guard_finds_a_reason(bench, tmp_path, 
     np.testing.assert_allclose(commands(b, 5)[:, 1], 0.0)
 
 
-def test_exciter_waits_for_the_first_word_of_an_owner_that_is_there(bench, tmp_path):
-    b = exciter_bench(bench, tmp_path)
-    owner = b.other.create_publisher(DiagnosticArray, "arming/state", 10)
-    b.until(lambda: b.node.count_publishers("arming/state") and owner.get_subscription_count())
+def arm(b):
+    """As the owner of the arming state says it."""
+    armed = DiagnosticStatus(level=DiagnosticStatus.OK, message="armed")
+    b.say("arming/state", DiagnosticArray(status=[armed]))
+    b.until(lambda: b.node._arming.armed)
+
+
+def test_exciter_waits_for_somebody_who_says_that_the_robot_is_armed(bench, tmp_path):
+    b = exciter_bench(bench, tmp_path, arming_required=True)
     show(b, 0.5)
     b.until(lambda: b.said(b"\x01", "waiting for the robot to be armed: no arming/state yet"))
     np.testing.assert_allclose(commands(b, 50)[:, 1:], 0.0)
-    armed = DiagnosticStatus(level=DiagnosticStatus.OK, message="armed")
-    owner.publish(DiagnosticArray(status=[armed]))
-    b.until(lambda: b.node._arming.armed)
+    arm(b)
     show(b, 0.8)
     assert np.abs(commands(b, 60)[:, 1]).max() > 40.0
 

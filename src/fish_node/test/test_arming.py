@@ -371,3 +371,13 @@ def test_two_threads_publish_the_state_one_after_the_other():
     for thread in threads:
         thread.join()
     assert (len(owner.sent), owner.most) == (2, 1)
+
+
+def test_a_state_that_was_never_heard_forbids_to_move_where_one_is_required():
+    bench = ListenerBench()
+    assert bench.listener.forbids(required=True).startswith("no arming/state yet")
+    assert bench.listener.forbids(required=False) == ""
+    bench.say((ROBOT, False))
+    assert bench.listener.forbids(required=True) == bench.listener.forbids(required=False)
+    bench.say((ROBOT, True))
+    assert bench.listener.forbids(required=True) == ""

@@ -5,7 +5,7 @@
 joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder:
 position = alpha (rad). A command follows each new odometry at once, and while none comes a timer; in simulated time, which
 waits for commands, they follow the timer alone. control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy
-of the weights file gives them. While arming/state says disarmed the commands are at rest. The watchdog pauses them on stale
+of the weights file gives them. The commands are at rest until arming/state says armed. The watchdog pauses them on stale
 or bad odometry, lost sensors and a stale target: they go to rest until all is well, and arming/pause says why. How long that
 may last, the owner of the arming state decides. Decisions are in Controller and Watchdog.
 """
@@ -185,7 +185,7 @@ class ControllerNode(Node):
         return Health(
             None if self._odometry is None else estimate_signs(self._odometry, now),
             None if math.isnan(self._target_time) else now - self._target_time,
-            self._arming.reason,
+            self._arming.forbids(self._config.arming_required),
         )
 
     def _report(self) -> None:

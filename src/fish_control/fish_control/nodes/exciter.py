@@ -67,7 +67,7 @@ class ExciterNode(Node):
         self._command = self.create_publisher(JointState, "joint_command", RESENT)
         self._written = CommandBytes()
         self._disarm = self.create_publisher(String, "arming/disarm", 10)
-        self._arming = ArmingListener(self)
+        self._arming, self._arming_required = ArmingListener(self), config.arming_required
         self._reporter = Reporter(self, self._command)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
         self.create_timer(1.0 / config.command_rate_hz, self._tick, clock=timer_clock(self))
@@ -81,7 +81,7 @@ class ExciterNode(Node):
         now = clock.nanoseconds * 1e-9
         dt = 0.0 if math.isnan(self._now) else min(max(now - self._now, 0.0), LONGEST_PERIOD)
         self._now = now
-        disarmed = "no arming/state yet" if self._arming.awaited else self._arming.reason
+        disarmed = self._arming.forbids(self._arming_required)
         command = self._exciter.command(now, dt, self._sight(now), disarmed)
         self._command.publish(self._written(clock.to_msg(), command))
         if self._exciter.state != self._said:

@@ -50,6 +50,7 @@ PLANAR = (0, 7, 35)  # x, y and rotation about z on the diagonal of a covariance
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 ARMED = "armed"
 FORGOTTEN_S = 1.0  # s; an owner says its state more often
+NEVER_HEARD = "no arming/state yet: the node rotor or simulator publishes it"
 ONE_TOO_MANY = "stop one of the two, or give it another domain"
 AFTER_STAMP = BODY + STAMP.size  # bytes of a message with a header
 
@@ -220,16 +221,11 @@ class ArmingListener:
         self._known = b""  # the newest message after its stamp
         self._words: dict[str, str] = {}  # of that message: owner -> why disarmed, empty if armed
         self._heard: dict[str, tuple[float, str]] = {}  # owner -> s, the same
-        self._node = node
-        self._subscription = node.create_subscription(
-            DiagnosticArray, "arming/state", self._on_message, 10, raw=True
-        )
+        node.create_subscription(DiagnosticArray, "arming/state", self._on_message, 10, raw=True)
 
-    @property
-    def awaited(self) -> bool:
-        """Whether there is an owner, and no word of it was heard."""
-        topic = self._subscription.topic_name
-        return self.armed is None and self._node.count_publishers(topic) > 0
+    def forbids(self, required: bool) -> str:
+        """Why nothing may move; empty if it may. required: a state that was never heard forbids it, too."""
+        return NEVER_HEARD if required and self.armed is None else self.reason
 
     def _on_message(self, data: bytes) -> None:
         """Twenty times a second, and mostly what is known but for the stamp."""
