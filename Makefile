@@ -91,7 +91,7 @@ install/.built: $(VENV)/.run colcon.meta $(SOURCES)
 build: install/.built
 
 # What is needed to check the robot's software, and not to run the robot.
-install/.studies: install/.built $(STUDIES)
+install/.studies: install/.built $(STUDIES) $(VENV)/.diagnose
 	@$(ACTIVATE); colcon build $(WITH_STUDIES) --packages-select fish_study
 	@touch $@
 
@@ -101,7 +101,7 @@ demo: build
 		$(if $(HARDWARE),--hardware '$(HARDWARE)') $(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(if $(VIEW),--view) $(ARGS)
 
 # A few small scenarios; ARGS='--scenarios 300 --oracle' is the study. The same OUT goes on where it was stopped.
-prove: install/.studies $(VENV)/.diagnose
+prove: install/.studies
 	@$(ROBOFISH) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--scenarios 4 --groups single sensor outside null --trials 6 --duration 8)
 
 identify diagnose: build $(VENV)/.diagnose

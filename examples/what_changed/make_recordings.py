@@ -4,7 +4,7 @@
 
 python examples/what_changed/make_recordings.py FOLDER
 
-FOLDER is new or empty; some seconds, 4 MB.
+FOLDER is new or empty; some seconds, the first time some minutes, as kernels are compiled; 4 MB.
 """
 
 import sys

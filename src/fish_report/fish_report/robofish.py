@@ -58,7 +58,13 @@ BROUGHT_BY = {
     "prove": "fish_study",
     "paper": "fish_study",
 }
-BRINGS_PACKAGES = "`make setup`, or `pip install -r requirements-diagnose.txt -r requirements-train.txt`, brings it"
+# what brings the packages that the robot does not need; other ones: all of these files
+FILES = {
+    "statsmodels": "-r requirements-diagnose.txt",
+    "torch": "-r requirements-train.txt",
+    "tensorboard": "-r requirements-train.txt",
+}
+EVERY_FILE = "-r requirements-diagnose.txt -r requirements-train.txt"
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -119,7 +125,8 @@ def run_verb(verb: str, argv: list[str] | None = None) -> int:
         missing = (error.name or "").split(".")[0]
         if not missing or missing.startswith("fish_"):
             raise
-        said = f"the Python package {missing} is not installed; {BRINGS_PACKAGES}"
+        files = FILES.get(missing, EVERY_FILE)
+        said = f"the Python package {missing} is not installed; `make setup`, or `pip install {files}`, brings it"
     except UserError as error:  # a library's text on a file may have several lines
         said = " ".join(str(error).split())
     except OSError as error:
