@@ -23,6 +23,7 @@ from fish_bringup.node_table import (
 from reference_pages import HEADER, cell, table
 
 SPECS = (*SIMULATED, *REAL, FAKE[0], *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES, VIEW)
+DRIVE = "fish_bringup", "operator"  # package and module of what the verb drive publishes and takes
 BY_NAME = ("fish_node.nodes.arming", "fish_node.nodes.frames")
 CREATORS = {
     "create_publisher": "publishes",
@@ -32,6 +33,7 @@ CREATORS = {
 }
 MEANING = {
     "joint_command": "rotor: phase [rad] and speed [rad/s]; rudder: angle [rad]; 100 Hz",
+    "joy": "axes and buttons of a gamepad, from joy_node of the full ROS 2",
     "lockstep": "whom a simulator in lockstep waits for: how far somebody (frame_id) is (stamp)",
     "joint_states": "encoder of the rotor: angle [rad], speed [rad/s]; 100 Hz",
     "imu/data": "turn rate [rad/s], specific force [m/s^2], orientation, in imu_link; 100 Hz",
@@ -96,6 +98,8 @@ def page() -> str:
     for spec in SPECS:
         for role, message, topic in interfaces(spec.package, spec.executable):
             found[role][topic, message].add(spec.name)
+    for role, message, topic in interfaces(*DRIVE):
+        found[role][topic, message].add(f"{DRIVE[0]}/robofish drive")
     topics = sorted({*found["publishes"], *found["takes"]}, key=lambda key: key[0].lstrip("/"))
     rows = (
         (

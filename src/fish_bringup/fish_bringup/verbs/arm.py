@@ -3,8 +3,8 @@
 """Arm the robot: rotor and rudder follow commands from then on; --off disarms it at once.
 
 A robot is disarmed when it starts, and again after every trouble: stale commands, a lost camera or IMU, a hot coil, a leak and
-others. This command, the service arm, the operator's panel and a gamepad arm it, and nothing else. What speaks against it is
-printed, and the exit status is then 1.
+others. This command, the service arm, the page of `robofish view --control` and a gamepad arm it, and nothing else. What speaks
+against it is printed, and the exit status is then 1.
 """
 
 from __future__ import annotations
