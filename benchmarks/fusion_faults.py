@@ -95,18 +95,21 @@ class Score:
 
 def fuse(stream: Stream, fault: Fault) -> Score:
     """Feed a run; the estimates are compared at every sample and pose that arrives."""
-    fusion, rows = Fusion(), []
+    fusion, rows, clocks = Fusion(), [], {"camera": 0.0, "imu": 0.0}
     times = stream.imu[:, 0]
     for arrival, sensor, stamp, values in events(stream, fault.clocks):
         if sensor == "imu":
-            fusion.add_imu(stamp, *values[:3])
+            used = fusion.add_imu(stamp, *values[:3])
         else:
+            used = True
             fusion.add_pose(stamp, values, POSE_COVARIANCE)
+        if used:  # until its stamps are believed, an IMU whose clock was set leaves the estimate at the clock before
+            clocks[sensor] = fault.clocks(arrival, sensor) or 0.0
         estimate = fusion.estimate() if arrival >= FAULT else None
         if estimate is None:
             continue
         # without the IMU the estimate has the camera's clock
-        ahead = fault.clocks(arrival, "camera" if estimate.imu_lost else "imu") or 0.0
+        ahead = clocks["camera" if estimate.imu_lost else "imu"]
         true = [np.interp(estimate.time - ahead, times, stream.truth[:, k]) for k in (0, 1)]
         std = math.sqrt(estimate.pose_covariance[0, 0] + estimate.pose_covariance[1, 1])
         rows.append((arrival, math.hypot(*(estimate.pose[:2] - true)), std))

@@ -18,11 +18,11 @@ from fish_control.imu_heading import HeadingNoise, ImuHeading
 from fish_control.imu_history import ImuHistory, inertial_sample
 from fish_control.measurement_buffer import CameraPose, Moment, RawPose, Timeline, start_moment
 from fish_control.motion_models import MotionModels
+from fish_control.stamp_checks import ImuStamps, PoseStamps
 from fish_control.strapdown import MotionModel, NoiseScale, StrapdownFilter
 
 Array = NDArray[np.float64]
 SILENT_POSES = 3  # in a row without an IMU sample in between: the IMU is dead; stamps cannot say it
-OLD_POSES = 3  # in a row from before the history: the clock was set back, where no IMU says it
 SWIMS = 0.03  # m/s; a fish at rest does not show how well its motion is measured
 LONGEST_WAIT = 0.3  # s, beyond imu_timeout, that a pose may be ahead of a living IMU: its clock, or the IMU has a gap
 REFIT = 0.005  # s, change of the camera's offset after which the history is fused anew
@@ -57,12 +57,9 @@ class Fusion:
         self._raw, self._waiting = deque[RawPose](), deque[RawPose]()  # fused, ahead of the IMU
         self._timeline: Timeline | None = None
         self._candidates, self._repeated = checks.AgreeingPoses(), checks.RepeatedPose()
-        self._last_pose_time = self._last_imu_time = (
-            self._accepted_at
-        ) = -math.inf  # s, by the sensors' clock
+        self._last_pose_time = self._last_imu_time = self._accepted_at = -math.inf  # s
         self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
-        self._stale = checks.StaleStamps()
-        self._old_poses = 0  # in a row from before the history
+        self._imu_stamps, self._pose_stamps = ImuStamps(c.history), PoseStamps(c.history)
         self._models.begin()
         self._filter.model = self._models.current
 
@@ -98,13 +95,10 @@ class Fusion:
             (time, yaw_rate, forward, left, yaw, yaw_std), self.config
         ):
             return self._refuse(reason)
-        stale = self._stale.set_back(time, self._last_imu_time)
-        if stale or time < self._last_imu_time - self.config.history:
-            self._restart()  # the clock was set back, as in a restarted simulation
-        if time <= self._last_imu_time:
-            return self._refuse(
-                "imu_out_of_order" if time < self._last_imu_time else "imu_duplicate"
-            )
+        if self._imu_stamps.set_back(time, self._last_imu_time, self._last_pose_time):
+            self._restart()  # as in a restarted simulation
+        if reason := self._imu_stamps.refusal(time, self._last_imu_time, self._last_pose_time):
+            return self._refuse(reason)
         previous, self._last_imu_time, self._poses_in_a_row = self._last_imu_time, time, 0
         self.counts["imu"] += 1
         step = self.imu_heading.add(time, yaw_rate, yaw, yaw_std or self.config.imu_heading_noise)
@@ -137,11 +131,12 @@ class Fusion:
             return False
         if not imu_lives:
             self._fuse_waiting(math.inf, imu_lives)
-        old = not imu_lives and time < self._last_pose_time - self.config.history
-        self._old_poses = self._old_poses + 1 if old else 0
-        if self._old_poses >= OLD_POSES:
+        if self._pose_stamps.set_back(time, self._last_pose_time, imu_lives):
             self._restart()
         return self._take(RawPose(stamp, camera), imu_lives)
+        newest = max(self._last_imu_time, self._last_pose_time)
+        if self._pose_stamps.from_future(time, newest, imu_lives):
+            return self._refuse("pose_from_future")
 
     def estimate(self, silence: float = 0.0) -> Estimate | None:
         """State at the newest IMU sample, without an IMU at the newest pose; None before the first.

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which measurements the fusion uses, and how much a camera pose counts.
 
-Refused are IMU samples that no fish can have produced, stamps of a clock that was set back, repeats of one picture and poses
-without a usable covariance. A pose counts by its message, the noise that the data show and the camera's clock.
+Refused are IMU samples and poses that no fish can have produced, repeats of one picture and poses without a usable covariance.
+A pose counts by its message, the noise that the data show and the camera's clock.
 """
 
 from __future__ import annotations
@@ -34,26 +34,6 @@ def unusable_sample(values: Sequence[float | None], config: FusionConfig) -> str
     if math.hypot(forward, left) > config.largest_accel or abs(yaw_rate) > config.largest_yaw_rate:
         return "imu_implausible"
     return ""
-
-
-ENOUGH = 4  # stale stamps in a row; stragglers are fewer, and not in their own order
-
-
-class StaleStamps:
-    """Counts stamps that increase among themselves, all before the newest one seen."""
-
-    def __init__(self) -> None:
-        self._last, self._count = 0.0, 0
-
-    def set_back(self, time: float, newest: float) -> bool:
-        """Whether a stamp [s] with those before it says that the clock was set back; newest: of all so far [s]."""
-        in_order = self._count > 0 and time > self._last
-        self._last = time
-        if time > newest:
-            self._count = 0
-        else:
-            self._count = self._count + 1 if in_order else 1
-        return self._count >= ENOUGH
 
 
 FASTEST_SWIM = 0.6  # m/s, poses of one fish are no farther apart

@@ -789,3 +789,66 @@ def test_poses_that_come_while_the_imu_pauses_are_used(silence):
     assert fusion.counts["pose_from_future"] == 0
     assert fusion.counts["pose"] >= 115  # of 120, three of which start it
     assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
+
+
+@pytest.mark.parametrize("future", [1, 2])
+def test_future_stamps_while_the_imu_pauses_hold_nothing_up(future):
+    fusion, sent = Fusion(), 0
+    for event in gap(measurements(6.0), 2.0, 2.6):
+        feed(fusion, [event])
+        if event[0] > 2.4 and sent < future:
+            assert not fusion.add_pose(event[0] + 1e5 + sent, event[3])
+            sent += event[1] == "camera"
+    assert fusion.counts["pose_from_future"] >= future
+    assert fusion.counts["pose_too_late"] == 0
+    assert fusion.counts["restarted"] == 0
+    assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
+
+
+@pytest.mark.parametrize("future", [5, 12])
+def test_an_imu_that_speaks_again_ends_a_row_of_future_stamps(future):
+    """Without an IMU so many of them are a clock that was set."""
+    fusion, events = Fusion(), measurements(6.0)
+    feed(fusion, [e for e in events if e[0] < 3.0])
+    for k in range(future):
+        fusion.add_pose(1e5 + k / 30.0, truth(3.0)[0])
+    feed(fusion, [e for e in events if e[0] >= 3.0])
+    assert fusion.counts["restarted"] == (future > 5)
+    assert fusion.estimate().time == pytest.approx(5.99)
+    assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
+    assert not fusion.estimate().camera_lost
+
+
+def test_a_camera_s_clock_set_ahead_while_no_imu_lives_is_followed():
+    fusion, poses = Fusion(), [e for e in measurements(4.0) if e[1] == "camera"]
+    feed(fusion, [(a, k, s + 100.0 * (s > 2.0), v) for a, k, s, v in poses])
+    assert fusion.counts["pose_from_future"] == 2
+    assert fusion.counts["restarted"] == 0
+    assert fusion.estimate().time > 103.9
+
+
+@pytest.mark.parametrize("stamp", [0.0, 50.0, 2.0**31])
+@pytest.mark.parametrize("count", [1, 3])
+def test_single_stamps_of_the_imu_from_another_time_are_dropped(stamp, count):
+    fusion, begin = Fusion(), 100.0
+    for arrival, kind, time, values in measurements(6.0):
+        feed(fusion, [(arrival, kind, time + begin, values)])
+        if kind == "imu" and time == pytest.approx(3.0):
+            before = fusion.estimate()
+            assert not any(fusion.add_imu(stamp + 0.01 * k, *values) for k in range(count))
+            np.testing.assert_array_equal(fusion.estimate().pose, before.pose)
+    assert fusion.counts["imu_out_of_order" if stamp < begin else "imu_from_future"] == count
+    assert fusion.counts["restarted"] == 0
+    estimate = fusion.estimate()
+    assert estimate.time == pytest.approx(begin + 5.99)
+    assert np.hypot(*(estimate.pose - truth(estimate.time - begin)[0])[:2]) < 0.01
+
+
+@pytest.mark.parametrize("ahead", [60.0, 3600.0])
+def test_both_clocks_set_ahead_lose_three_samples_and_go_on(ahead):
+    fusion, events = Fusion(), swum(10.0)
+    moved = [(a, k, s + ahead * (a > 6.0), v) for a, k, s, v in events]
+    distances, _ = errors_of_swum(fusion, moved, ahead)
+    assert fusion.counts["imu_from_future"] == 3
+    assert fusion.counts["restarted"] == 0
+    assert distances[-100:].max() < 0.02
