@@ -228,7 +228,7 @@ class Fusion:
         yaw = float(self._imu.heading(np.array([time]))[0]) if len(self._imu) else 0.0
         if self._repeated.check(pose, yaw, math.hypot(*filter.x[3:5]), speed_std):
             return self._refuse("pose_repeated")
-        self._raw.append(raw)
+        self._raw = raw.after(self._raw, self.config.history + self.config.imu_timeout)
         camera = self._weighted(raw.camera, time)
         y, S = filter.innovation(pose, camera.R)
         fits = float(y @ np.linalg.solve(S, y)) <= self.config.gate
@@ -271,7 +271,7 @@ class Fusion:
 
     def _start(self, raw: RawPose) -> bool:
         """Wait for poses that agree, then begin at rest at the last one."""
-        self._raw.append(raw)
+        self._raw = raw.after(self._raw, self.config.history + self.config.imu_timeout)
         time = raw.stamp + self._applied
         if self._candidates.add(time, raw.camera.pose) < self.config.start_frames:
             return False

@@ -10,6 +10,8 @@ poses the IMU's samples are integrated at once.
 from __future__ import annotations
 
 import bisect
+from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -36,6 +38,10 @@ class RawPose(NamedTuple):
 
     stamp: float  # s
     camera: CameraPose
+
+    def after(self, others: Iterable[RawPose], reach: float) -> deque[RawPose]:
+        """It and the others whose stamps are within `reach` [s] of its own: one from far ahead would stay for ever."""
+        return deque((*(raw for raw in others if abs(raw.stamp - self.stamp) <= reach), self))
 
 
 @dataclass

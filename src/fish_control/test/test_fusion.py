@@ -852,3 +852,21 @@ def test_both_clocks_set_ahead_lose_three_samples_and_go_on(ahead):
     assert fusion.counts["imu_from_future"] == 3
     assert fusion.counts["restarted"] == 0
     assert distances[-100:].max() < 0.02
+
+
+def test_poses_that_never_agree_are_not_kept():
+    fusion, kept = Fusion(), 0
+    for k in range(1000):
+        fusion.add_imu(k / 30.0, 0.0, 0.0, 0.0)
+        fusion.add_pose(k / 30.0, [float(k % 2), 0.0, 0.0])
+        kept = max(kept, len(fusion._raw))
+    assert kept <= 30 * (fusion.config.history + 0.2)
+
+
+@pytest.mark.parametrize("imu", [True, False])
+def test_a_future_stamp_at_first_does_not_keep_all_poses_after_it(imu):
+    fusion = Fusion()
+    fusion.add_pose(1e5, truth(0.0)[0])
+    feed(fusion, [e for e in measurements(8.0) if imu or e[1] == "camera"])
+    assert fusion.counts["started"] == 1
+    assert len(fusion._raw) <= 30 * (fusion.config.history + 0.2)
