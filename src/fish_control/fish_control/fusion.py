@@ -113,6 +113,7 @@ class Fusion:
 
     def add_pose(self, stamp: float, pose: ArrayLike, covariance: Array | None = None) -> bool:
         """A camera pose (x, y, psi) [m, m, rad] with its stamp [s]; False if it was not used."""
+        self.refused = ""
         camera = CameraPose(np.array(pose, float), checks.given_covariance(covariance, self.config))
         if reason := checks.unusable(stamp, camera, covariance):
             return self._refuse(reason)
@@ -133,10 +134,10 @@ class Fusion:
             self._fuse_waiting(math.inf, imu_lives)
         if self._pose_stamps.set_back(time, self._last_pose_time, imu_lives):
             self._restart()
-        return self._take(RawPose(stamp, camera), imu_lives)
         newest = max(self._last_imu_time, self._last_pose_time)
         if self._pose_stamps.from_future(time, newest, imu_lives):
             return self._refuse("pose_from_future")
+        return self._take(RawPose(stamp, camera), imu_lives)
 
     def estimate(self, silence: float = 0.0) -> Estimate | None:
         """State at the newest IMU sample, without an IMU at the newest pose; None before the first.

@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from fish_control.estimate import Estimate
 from fish_control.fusion import Fusion
+from fish_control.fusion_config import FusionConfig
 from fish_control.imu_heading import against_gyro
 
 NOTABLE_OFFSET = 0.02  # s, difference to camera_offset that is worth a warning
@@ -17,6 +19,19 @@ def lost_sensors(estimate: Estimate) -> list[str]:
     """Names of the sensors that are lost."""
     pairs = (("camera", estimate.camera_lost), ("IMU", estimate.imu_lost))
     return [name for name, lost in pairs if lost]
+
+
+def implausible_sample(values: Sequence[float | None], config: FusionConfig) -> str:
+    """What is wrong with a sample that fusion counts as implausible.
+
+    Args:
+        values: yaw rate [rad/s], specific force ahead and to the left [m/s^2], then others; None: not measured.
+    """
+    yaw_rate, forward, left, *_ = (value or 0.0 for value in values)
+    return (
+        f"it says {yaw_rate:g} rad/s and {math.hypot(forward, left):g} m/s^2 in the plane, expected at most "
+        f"{config.largest_yaw_rate:g} rad/s and {config.largest_accel:g} m/s^2"
+    )
 
 
 def clock_warning(fusion: Fusion) -> str | None:

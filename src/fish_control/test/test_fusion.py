@@ -854,6 +854,22 @@ def test_both_clocks_set_ahead_lose_three_samples_and_go_on(ahead):
     assert distances[-100:].max() < 0.02
 
 
+@pytest.mark.parametrize("far", [1.1e3, -1e13, 1e300])
+@pytest.mark.parametrize("begun", [False, True])
+def test_positions_that_no_fish_can_have_neither_start_nor_move_the_estimate(begun, far):
+    fusion = Fusion()
+    feed(fusion, measurements(2.0) if begun else [])
+    for k in range(60):
+        fusion.add_imu(3.0 + 0.03 * k, 0.0, 0.0, 0.0)
+        assert not fusion.add_pose(3.0 + 0.03 * k, [far, 0.0, 0.0])
+        assert not fusion.add_pose(3.01 + 0.03 * k, [0.0, far, 0.0])
+    assert fusion.counts["pose_implausible"] == 120
+    assert fusion.counts["reacquired"] == 0
+    assert (fusion.estimate() is not None) == begun
+    feed(fusion, [(a, k, s + 6.0, v) for a, k, s, v in measurements(3.0)])
+    assert np.hypot(*(fusion.estimate().pose - truth(2.99)[0])[:2]) < 0.02
+
+
 def test_poses_that_never_agree_are_not_kept():
     fusion, kept = Fusion(), 0
     for k in range(1000):

@@ -19,7 +19,13 @@ from sensor_msgs.msg import Imu
 
 from fish_control.estimate import Estimate
 from fish_control.fusion import Fusion
-from fish_control.fusion_status import clock_values, clock_warning, lost_sensors
+from fish_control.fusion_config import LARGEST_DISTANCE
+from fish_control.fusion_status import (
+    clock_values,
+    clock_warning,
+    implausible_sample,
+    lost_sensors,
+)
 from fish_control.node_configs import FusionNodeConfig
 from fish_control.nodes.messages import (
     ERROR,
@@ -54,6 +60,10 @@ REFUSALS = {
         "its poses are not finite, or their quaternion has no length",
         "a tracker that sees no fish publishes no pose",
     ),
+    "pose_implausible": (
+        f"its poses are more than {LARGEST_DISTANCE:g} m from the pool's origin along x or y",
+        "set the tracker's unit to metres and its origin in the pool",
+    ),
 }
 SENSORS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -87,9 +97,16 @@ class FusionNode(Node):
         self._logged: set[str] = set()  # remedies of refusals: each is logged once
 
     def _on_imu(self, message: Imu) -> None:
-        if self._fusion.add_imu(seconds(message.header.stamp), *inertial_values(message)):
+        values = inertial_values(message)
+        if self._fusion.add_imu(seconds(message.header.stamp), *values):
             self._used = self._now()
             self._publish(self._fusion.estimate())
+        elif self._fusion.refused == "imu_implausible":
+            wrong = implausible_sample(values, self._fusion.config)
+            self._log_once(
+                f"imu/data is not fused: {wrong}",
+                "check its units; largest_yaw_rate and largest_accel are parameters",
+            )
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         frame = message.header.frame_id
@@ -106,16 +123,20 @@ class FusionNode(Node):
         if self._fusion.add_pose(time, pose, covariance):
             self._used, self._refusal = self._now(), ""
         elif self._fusion.refused in REFUSALS:
-            self._refuse(*REFUSALS[self._fusion.refused])
+            seen = "; x {:g} m, y {:g} m, yaw {:g} rad".format(*pose)
+            self._refuse(*REFUSALS[self._fusion.refused], seen)
         if self._fusion.imu_lost(self._silence()):  # no IMU message will publish the estimate
             self._publish(self._estimate())
 
-    def _refuse(self, reason: str, remedy: str) -> None:
-        """Note why a pose is not fused; the first of its kind is logged."""
+    def _refuse(self, reason: str, remedy: str, seen: str = "") -> None:
+        """Note why a pose is not fused; the first of its kind is logged, with what it says."""
         self._refusal = reason
+        self._log_once(f"camera/pose is not fused: {reason}{seen}", remedy)
+
+    def _log_once(self, problem: str, remedy: str) -> None:
         if remedy not in self._logged:
             self._logged.add(remedy)
-            self.get_logger().error(f"camera/pose is not fused: {reason}; {remedy}")
+            self.get_logger().error(f"{problem}; {remedy}")
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9
