@@ -112,6 +112,7 @@ WILD = 9.0  # squared innovations count no more than this many variances
 RESET = 1.0  # rad, an orientation that jumps by more has a new zero
 BIAS_STD = 0.05  # rad/s, of the gyro's bias at first
 ROUNDING = 1e-9  # s, of the time between two samples
+LARGEST_YAW_STD = math.pi  # rad, of an orientation; with more it says nothing of the yaw
 
 
 class HeadingNoise(NamedTuple):
@@ -173,6 +174,8 @@ class ImuHeading:
             mean = (rate if before is None else 0.5 * (rate + before)) - self._bias
         variance = self._predict(mean, dt, measured)
         correction = 0.0
+        if yaw is not None and yaw_std > LARGEST_YAW_STD:
+            yaw = None
         if yaw is not None:
             correction = self._correct(yaw, yaw_std, measured)
             variance = min(variance, 2.0 * self._P[0])

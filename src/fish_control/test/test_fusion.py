@@ -886,3 +886,15 @@ def test_a_future_stamp_at_first_does_not_keep_all_poses_after_it(imu):
     feed(fusion, [e for e in measurements(8.0) if imu or e[1] == "camera"])
     assert fusion.counts["started"] == 1
     assert len(fusion._raw) <= 30 * (fusion.config.history + 0.2)
+
+
+@pytest.mark.parametrize("std", [4.0, 1e80, 1e155])
+def test_an_orientation_that_says_nothing_is_left_out(std):
+    plain, fusion = Fusion(), Fusion()
+    for event in measurements(3.0):
+        feed(plain, [event])
+        if event[1] == "imu":
+            fusion.add_imu(event[2], *event[3], 1.0, std)
+        else:
+            feed(fusion, [event])
+    np.testing.assert_array_equal(fusion.estimate().pose, plain.estimate().pose)

@@ -319,6 +319,40 @@ def test_fusion_uses_nothing_that_a_message_calls_not_measured(bench):
     assert node._fusion.counts["imu"] == 1
 
 
+@pytest.mark.parametrize("variance", [-1e-3, 1e155, 1e308, math.inf, math.nan])
+def test_a_yaw_of_which_the_variance_is_none_is_not_used(bench, variance):
+    node = bench(FusionNode).node
+    for k in range(3):
+        message = Imu()
+        message.header.stamp = to_stamp(5.0 + 0.01 * k)
+        message.orientation.w, message.angular_velocity.z = 1.0, 0.5
+        message.orientation_covariance[8] = variance if k == 0 else 1e-4
+        values = inertial_values(message)
+        assert values[3:] == ((None, None) if k == 0 else (0.0, pytest.approx(0.01)))
+        node._on_imu(message)
+    assert node._fusion.counts["imu"] == 3
+    assert math.isfinite(node._fusion._imu.yaw[-1])
+
+
+def test_a_yaw_of_unknown_variance_has_the_parameter_s():
+    message = Imu()
+    message.orientation.w = 1.0
+    assert inertial_values(message)[3:] == (0.0, None)
+
+
+def test_fusion_says_once_what_a_sample_says_that_no_fish_can_do(bench):
+    b = bench(FusionNode)
+    said = []
+    b.node._log_once = lambda problem, remedy: said.append((problem, remedy))
+    message = Imu()
+    message.angular_velocity.z = 1e300
+    message.header.stamp = to_stamp(5.0)
+    b.node._on_imu(message)
+    assert "1e+300 rad/s" in said[0][0]
+    assert "expected at most 12 rad/s and 20 m/s^2" in said[0][0]
+    assert b.node._fusion.counts["imu"] == 0
+
+
 def test_fusion_survives_values_that_are_no_numbers(bench):
     b = bench(FusionNode)
     b.listen("odometry/filtered", Odometry)

@@ -21,6 +21,7 @@ from std_msgs.msg import Header
 
 from fish_control.controller import Command
 from fish_control.estimate import Estimate
+from fish_control.imu_heading import LARGEST_YAW_STD
 from fish_control.line_of_sight import Motion
 from fish_control.planner import Plan
 from fish_control.watchdog import EstimateHealth, is_plausible
@@ -62,17 +63,18 @@ def inertial_values(
 ) -> tuple[float | None, float | None, float | None, float | None, float | None]:
     """Yaw rate [rad/s], forward and left specific force [m/s^2], yaw [rad] and its deviation [rad].
 
-    None: not measured, which a first covariance of -1 says, or where a quaternion is none; a deviation that is not given.
+    None: not measured, which a first covariance of -1 says, or where a quaternion is none; a deviation that is not given. A yaw
+    whose variance is below 0, no number or larger than any heading's is not measured either.
     """
     rate = forward = left = yaw = std = None
     if message.angular_velocity_covariance[0] != NOT_MEASURED:
         rate = message.angular_velocity.z
     if message.linear_acceleration_covariance[0] != NOT_MEASURED:
         forward, left = message.linear_acceleration.x, message.linear_acceleration.y
-    measured = yaw_of(message.orientation)
-    if message.orientation_covariance[0] != NOT_MEASURED and math.isfinite(measured):
-        yaw, variance = measured, message.orientation_covariance[8]
-        std = math.sqrt(variance) if variance > 0.0 else None
+    measured, variance = yaw_of(message.orientation), message.orientation_covariance[8]
+    known = math.isfinite(measured) and 0.0 <= variance <= LARGEST_YAW_STD**2
+    if known and message.orientation_covariance[0] != NOT_MEASURED:
+        yaw, std = measured, math.sqrt(variance) or None
     return rate, forward, left, yaw, std
 
 
