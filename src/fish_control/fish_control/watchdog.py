@@ -38,6 +38,8 @@ class Health:
 
     estimate: EstimateHealth | None
     target_age: float | None  # s since the stamp
+    twist_age: float | None  # s, of the target's speed and yaw rate
+    error_age: float | None  # s, of the distance from the path
     disarmed: str = ""  # why the robot is not armed; empty while it may move
 
 
@@ -88,9 +90,17 @@ class Watchdog:
         fault = estimate_fault(signs.estimate, config.odometry_timeout, config.largest_variance)
         if fault is not None:
             return fault
-        if signs.target_age is None:
-            return "waiting for a target"
-        return _age_fault("target", signs.target_age, config.target_timeout)
+        ages = {
+            "target": signs.target_age,
+            "control/twist": signs.twist_age,
+            "tracking/error": signs.error_age,
+        }
+        for name, age in ages.items():
+            if age is None:
+                return "waiting for a target" if name == "target" else f"waiting for {name}"
+            if fault := _age_fault(name, age, config.target_timeout):
+                return fault
+        return None
 
 
 def is_plausible(motion: Motion) -> bool:

@@ -194,7 +194,7 @@ def test_a_value_out_of_range_is_named(kind, field, value, expected):
 
 
 SURE = EstimateHealth(0.01, True, 1e-5, 1e-4)
-GOOD = Health(SURE, 0.02)
+GOOD = Health(SURE, 0.02, 0.02, 0.02)
 
 
 def but(**changes):
@@ -207,6 +207,9 @@ FAULTS = {
     "camera lost": but(pose_variance=1e4),
     "IMU lost": but(twist_variance=1e4),
     "target is stale": replace(GOOD, target_age=0.5),
+    "control/twist is stale": replace(GOOD, twist_age=0.5),
+    "tracking/error is stale": replace(GOOD, error_age=0.5),
+    "control/twist is from the future": replace(GOOD, twist_age=-0.3),
     "odometry is from the future: stamped 5.00 s ahead": but(age=-5.0),
     "target is from the future: stamped 0.30 s ahead": replace(GOOD, target_age=-0.3),
 }
@@ -220,10 +223,11 @@ def swimming(**parameters):
 
 def test_it_waits_for_odometry_and_target_without_calling_it_a_stop():
     dog = Watchdog(ControllerConfig())
-    assert not dog.check(0.0, Health(None, None))
+    assert not dog.check(0.0, Health(None, None, None, None))
     assert dog.reason == "waiting for odometry"
     assert dog.fault == ""
-    assert not dog.check(0.1, replace(GOOD, target_age=None))
+    for kind in ("target_age", "twist_age", "error_age"):
+        assert not dog.check(0.1, replace(GOOD, **{kind: None}))
     assert (dog.state, dog.stops) == ("waiting", 0)
     assert dog.check(0.2, GOOD)
     assert dog.state == "swimming"

@@ -768,11 +768,14 @@ def _feed(b, time, changes):
         twist = TwistStamped()
         twist.twist.linear.x = changes.get("speed", 0.2)
         twist.twist.angular.z = changes.get("yaw_rate", 0.1)
-        target = PoseStamped()
+        error, target = Vector3Stamped(), PoseStamped()
         target.header.stamp = to_stamp(time)
         target.pose.orientation = to_quaternion(0.3)
-        b.say("control/twist", twist)
-        b.say("tracking/error", Vector3Stamped())
+        twist.header = error.header = target.header
+        if "twist" not in without:
+            b.say("control/twist", twist)
+        if "error" not in without:
+            b.say("tracking/error", error)
         b.say("control/target", target)
         b.until(lambda: b.node._target_time == stamp)
 
@@ -817,8 +820,10 @@ def test_controller_streams_named_commands_and_labelled_gains(bench):
 
 
 def hear_plan(node, time):
-    node._on_target(PoseStamped(header=Header(stamp=to_stamp(time))))
-    node._on_twist(TwistStamped(twist=Twist(linear=Vector3(x=0.2))))
+    header = Header(stamp=to_stamp(time))
+    node._on_target(PoseStamped(header=header))
+    node._on_twist(TwistStamped(header=header, twist=Twist(linear=Vector3(x=0.2))))
+    node._on_error(Vector3Stamped(header=header))
 
 
 @pytest.mark.parametrize(("simulated", "count"), [(False, 5), (True, 0)])
@@ -858,6 +863,11 @@ def test_decisions_come_fifty_times_a_second_however_often_commands_come(bench, 
     [
         ({"without": ["odometry"]}, "odometry is stale"),
         ({"without": ["target"]}, "target is stale"),
+        ({"without": ["twist"]}, "control/twist is stale"),
+        ({"without": ["error"]}, "tracking/error is stale"),
+        ({"speed": math.nan}, "control/twist is stale"),
+        ({"speed": 1e9}, "control/twist is stale"),
+        ({"yaw_rate": math.inf}, "control/twist is stale"),
         ({"odometry": {"x": math.nan}}, "odometry is not plausible"),
         ({"odometry": {"variance": LOST_VARIANCE}}, "camera lost"),
         ({"odometry": {"twist_variance": LOST_VARIANCE}}, "IMU lost"),
@@ -924,9 +934,8 @@ def test_a_wish_that_no_robot_can_follow_is_forgotten_with_the_next(bench, speed
             node._on_error(Vector3Stamped(vector=Vector3(x=error)))
         if k == 110:
             hear_plan(node, 11.1)
-            node._on_error(Vector3Stamped())
         node._on_odometry(odometry(10.0 + 0.01 * k))
-        node._target_time = 10.0 + 0.01 * k
+        node._target_time = node._twist_time = node._error_time = 10.0 + 0.01 * k
         node._step(Time.from_msg(to_stamp(10.0 + 0.01 * k)))
         assert all(map(math.isfinite, node._gains_message.data))
     assert abs(node._controller._actuators.alpha) < 0.2

@@ -7,7 +7,8 @@ position = alpha (rad). A command follows each new odometry at once, and while n
 waits for commands, they follow the timer alone. control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy
 of the weights file gives them. The commands are at rest until arming/state says armed. The watchdog pauses them on stale
 or bad odometry, lost sensors and a stale target: they go to rest until all is well, and arming/pause says why. How long that
-may last, the owner of the arming state decides. Decisions are in Controller and Watchdog.
+may last, the owner of the arming state decides. Of target, twist and error each has its own age; a twist or an error that no
+fish can follow counts as none. Decisions are in Controller and Watchdog.
 """
 
 import math
@@ -40,7 +41,7 @@ from fish_control.nodes.messages import (
     yaw_of,
 )
 from fish_control.planner import FASTEST, SLOWEST
-from fish_control.watchdog import Health, Watchdog, loss
+from fish_control.watchdog import LARGEST_MOTION, Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.parameters import Changes
 from fish_node.nodes.quick_messages import hear
@@ -74,7 +75,8 @@ class ControllerNode(Node):
         Changes(self, config, self._change)
         self._watchdog = Watchdog(config)
         self._odometry: Odometry | None = None
-        self._odometry_time = self._target_time = math.nan
+        self._odometry_time = math.nan
+        self._target_time = self._twist_time = self._error_time = math.nan  # s, stamps
         self._wanted = Reference(0.0, 0.0, 0.0, 0.0)
         self._now = math.nan
         self._commanded = -math.inf  # s, stamp of the odometry that the last command followed
@@ -128,7 +130,9 @@ class ControllerNode(Node):
 
     def _on_twist(self, message: TwistStamped) -> None:
         speed, yaw_rate = message.twist.linear.x, message.twist.angular.z
-        if math.isfinite(speed) and math.isfinite(yaw_rate):
+        most = LARGEST_MOTION
+        if abs(speed) <= most.surge and abs(yaw_rate) <= most.yaw_rate:
+            self._twist_time = seconds(message.header.stamp)
             self._wanted = replace(
                 self._wanted,
                 speed=min(max(speed, SLOWEST), FASTEST) if speed > 0.0 else 0.0,
@@ -137,6 +141,7 @@ class ControllerNode(Node):
 
     def _on_error(self, message: Vector3Stamped) -> None:
         if abs(message.vector.x) <= LARGEST_ERROR:
+            self._error_time = seconds(message.header.stamp)
             self._wanted = replace(self._wanted, cross_track_error=message.vector.x)
 
     def _on_target(self, message: PoseStamped) -> None:
@@ -182,9 +187,14 @@ class ControllerNode(Node):
         self._paused = bool(fault)
 
     def _signs(self, now: float) -> Health:
+        def age(stamp: float) -> float | None:
+            return None if math.isnan(stamp) else now - stamp
+
         return Health(
             None if self._odometry is None else estimate_signs(self._odometry, now),
-            None if math.isnan(self._target_time) else now - self._target_time,
+            age(self._target_time),
+            age(self._twist_time),
+            age(self._error_time),
             self._arming.forbids(self._config.arming_required),
         )
 
