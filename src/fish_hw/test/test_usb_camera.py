@@ -12,11 +12,12 @@ from fakes import wait_until
 
 from fish_hw.devices import usb_camera
 from fish_hw.devices.reconnect import ERROR, OK, WARN, Loss
-from fish_hw.devices.usb_camera import UsbCamera, decode_jpeg, encode_jpeg, jpeg_size
+from fish_hw.devices.usb_camera import UsbCamera, decode_jpeg, encode_jpeg
 from fish_hw.emulators.walking_square import WalkingSquare
 from fish_hw.settings import CameraSettings
 from fish_hw.transport.interfaces import PortUnavailable
 from fish_hw.transport.video_capture import Frame, VideoCapture, compressed_frame
+from fish_node.picture_size import jpeg_size
 
 SETTINGS = CameraSettings(device="emulator", width=64, height=48)
 
@@ -366,9 +367,9 @@ def test_jpeg_size_of_damaged_data():
     assert jpeg_size(b"\xff\xd8\xff\xe0\x00\x00" * 5) is None  # a segment of length 0
 
 
-@pytest.mark.parametrize("size", [(0xFFFF, 0xFFFF), (0x8000 | 48, 0x8000 | 64)])
+@pytest.mark.parametrize("size", [(0xFFFF, 0xFFFF), (0x8000 | 48, 0x8000 | 64), (48, 0x4000 | 64)])
 def test_a_header_with_a_bit_error_in_the_size_is_no_picture(size):
-    """More pixels than OpenCV takes (2^30), which it says with an exception."""
+    """Of the first two OpenCV says with an exception that it takes no more than 2^30 pixels; the third it would unpack."""
     jpeg = encode_jpeg(picture(), 90)
     at = jpeg.index(b"\xff\xc0") + 5
     height, width = size

@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from fish_node.picture_size import LARGEST_SIDE, picture_size
 from fish_vision.segmentation import Image
 
 CONVERSIONS = {  # encoding -> channels, conversion to bgr8
@@ -46,7 +47,9 @@ class Repeats:
 
 
 def from_compressed(data: bytes, size: tuple[int, int] | None) -> Image:
-    """Picture from JPEG or PNG bytes; without a size any is taken.
+    """Picture from JPEG or PNG bytes; without a size any of at most LARGEST_SIDE pixels a side is taken.
+
+    The size is judged before the picture is unpacked.
 
     Raises:
         PictureError: not an image, or not of the expected size (width, height).
@@ -54,8 +57,12 @@ def from_compressed(data: bytes, size: tuple[int, int] | None) -> Image:
     packed = np.frombuffer(data, np.uint8)
     if packed[:2].tobytes() == JPEG_START and JPEG_END not in packed[-TRAILER:].tobytes():
         raise PictureError(f"JPEG picture cut off after {packed.size} bytes")
+    said = picture_size(packed.tobytes())
+    if said is None:
+        raise PictureError(f"{packed.size} bytes that are no JPEG or PNG picture, or a broken one")
+    _check_said(said, size)
     try:
-        picture = cv2.imdecode(packed, cv2.IMREAD_COLOR) if packed.size else None
+        picture = cv2.imdecode(packed, cv2.IMREAD_COLOR)
     except cv2.error as error:
         raise PictureError(f"{packed.size} bytes that cannot be decoded: {error.err}") from error
     if picture is None:
@@ -91,6 +98,18 @@ def from_raw(
 def to_jpeg(picture: Image, quality: int = 80) -> bytes:
     """The picture as JPEG."""
     return cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+
+
+def _check_said(said: tuple[int, int], size: tuple[int, int] | None) -> None:
+    """Refuse a picture whose head says another size; EXIF may turn it upright only while it is unpacked."""
+    if size is None and max(said) > LARGEST_SIDE:
+        raise PictureError(
+            f"image of {said[0]} x {said[1]}: expected at most {LARGEST_SIDE} x {LARGEST_SIDE}"
+        )
+    if size is not None and said not in (size, size[::-1]):
+        raise PictureError(
+            f"image of {said[0]} x {said[1]}, but camera_info says {size[0]} x {size[1]}"
+        )
 
 
 def _of_size(picture: Image, size: tuple[int, int]) -> Image:

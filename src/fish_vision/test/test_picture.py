@@ -93,6 +93,30 @@ def test_a_picture_of_another_size_is_refused() -> None:
         from_compressed(to_jpeg(PICTURE), (64, 48))
 
 
+def test_the_size_is_judged_before_a_picture_is_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
+    wide = cv2.imencode(".png", np.zeros((1, 9000, 3), np.uint8))[1].tobytes()
+    turned = to_jpeg(np.ascontiguousarray(PICTURE.transpose(1, 0, 2)))
+    unpacked = []
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: unpacked.append(1))
+    for data, size, said in (
+        (wide, SIZE, "9000 x 1, but camera_info says 32 x 24"),
+        (wide, None, "9000 x 1: expected at most 8192 x 8192"),
+        (to_jpeg(PICTURE), (64, 48), "32 x 24, but camera_info says 64 x 48"),
+    ):
+        with pytest.raises(PictureError, match=said):
+            from_compressed(data, size)
+    assert not unpacked
+    monkeypatch.undo()
+    with pytest.raises(PictureError, match="24 x 32, but camera_info says 32 x 24"):
+        from_compressed(turned, SIZE)
+
+
+def test_pictures_without_loss_are_taken() -> None:
+    png = cv2.imencode(".png", PICTURE)[1].tobytes()
+    np.testing.assert_array_equal(from_compressed(png, SIZE), PICTURE)
+    np.testing.assert_array_equal(from_compressed(png, None), PICTURE)
+
+
 @pytest.mark.parametrize(
     ("encoding", "width", "step", "message"),
     [

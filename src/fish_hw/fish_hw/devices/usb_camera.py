@@ -17,6 +17,7 @@ from fish_hw.devices.reconnect import ERROR, OK, WARN, DeviceError, Link, Status
 from fish_hw.settings import CameraSettings
 from fish_hw.transport.interfaces import PortUnavailable
 from fish_hw.transport.video_capture import Frame
+from fish_node.picture_size import LARGEST_SIDE, jpeg_size
 
 LIVE = ("/dev/", "unix:")  # devices with noise of their own; a file may hold equal pictures
 CLOSE_WAIT_S = 1.5  # longer than a camera keeps OpenCV waiting
@@ -199,23 +200,11 @@ def encode_jpeg(image: np.ndarray, quality: int) -> bytes:
 
 
 def decode_jpeg(jpeg: bytes) -> np.ndarray | None:
-    """BGR image (height, width, 3) of a JPEG, None if it is damaged beyond reading."""
+    """BGR image (height, width, 3) of a JPEG, None if it is damaged beyond reading or larger than LARGEST_SIDE."""
+    size = jpeg_size(jpeg)
+    if size is None or max(size) > LARGEST_SIDE:  # a bit error in the head asks for gigabytes
+        return None
     try:
         return cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-    except cv2.error:  # a bit error in the header makes a picture larger than OpenCV takes
+    except cv2.error:
         return None
-
-
-def jpeg_size(jpeg: bytes) -> tuple[int, int] | None:
-    """Width and height in px from the start-of-frame segment, None if there is none.
-
-    Source: ITU-T T.81, annex B.
-    """
-    at = 2
-    while at + 9 <= len(jpeg) and jpeg[at] == 0xFF:
-        marker = jpeg[at + 1]
-        if marker in (0xC0, 0xC1, 0xC2):
-            height = int.from_bytes(jpeg[at + 5 : at + 7], "big")
-            return int.from_bytes(jpeg[at + 7 : at + 9], "big"), height
-        at += 2 + int.from_bytes(jpeg[at + 2 : at + 4], "big")
-    return None
