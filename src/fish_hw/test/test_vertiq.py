@@ -184,6 +184,22 @@ def test_value_that_is_no_number_is_no_sample(register):
     assert vertiq.counters.unexpected == 1
 
 
+@pytest.mark.parametrize(
+    "register", [iquart.OBS_VELOCITY, iquart.OBS_ANGLE], ids=["speed", "angle"]
+)
+@pytest.mark.parametrize("absurd", [1e30, -1e5])
+def test_an_absurd_value_is_no_sample_and_spoils_no_later_angle(register, absurd):
+    wrong = encode(Message(register.type, register.param, REPLY, 0, struct.pack("<f", absurd)))
+    good = VELOCITY_REPLY + ANGLE_REPLY
+    other = ANGLE_REPLY if register is iquart.OBS_VELOCITY else VELOCITY_REPLY
+    vertiq, _ = recorded(b"", good, b"", wrong + other, b"", good)
+    before = vertiq.measure()
+    assert vertiq.measure() is None
+    assert vertiq.counters.unexpected == 1
+    vertiq._clock.now += 0.01
+    assert vertiq.measure().angle == pytest.approx(before.angle, abs=2 * math.tau)
+
+
 def test_angle_is_continuous_through_many_turns():
     vertiq, stream = recorded()
     period, speed = 0.02, 120.0  # 2.4 rad per sample: more than a third of a turn

@@ -21,6 +21,9 @@ from fish_hw.transport.interfaces import ByteStream
 COAST_REPEATS = 3  # a lost byte must not keep the rotor spinning
 CONFIGURE_TRIES = 3
 DRAIN_READS = 8
+MOST_VALUE = (
+    1e4  # rad/s or rad; a rotor turns with hundreds, and the module gives angles within +-pi
+)
 MOST_READS = 200  # for the answers of one exchange, on a clock that stands still
 
 
@@ -199,7 +202,9 @@ class Vertiq:
         if velocity is None or angle is None:
             return None
         speed, wrapped = velocity[0], angle[0]
-        if not (math.isfinite(speed) and math.isfinite(wrapped)):
+        if not (
+            abs(speed) <= MOST_VALUE and abs(wrapped) <= MOST_VALUE
+        ):  # nor NaN: the angle is kept
             self.counters.unexpected += 1
             return None
         time_s = (self._asked_s + self._clock()) / 2
