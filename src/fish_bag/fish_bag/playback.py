@@ -14,6 +14,8 @@ from fish_bag.bag import RawTopic, read_bag
 from fish_bag.problem import RecordingError
 from fish_bag.recorder_config import is_selected
 
+LEAST_ROUND_NS = 100_000_000  # steady time of a round that is repeated
+
 
 @dataclass(frozen=True)
 class ReplayerConfig:
@@ -108,6 +110,13 @@ class Playback:
             held = ", ".join(sorted({raw.topic for raw in bag.topics})) or "nothing"
             raise RecordingError(f"{path}: no message on the selected topics; it holds {held}")
         self.start_ns = min(int(raw.arrival_ns[0]) for raw in bag.topics if raw.raws)
+        self.end_ns = max(int(raw.arrival_ns.max()) for raw in self.topics)
+        self._rate = config.rate
+
+    @property
+    def rest_ns(self) -> int:
+        """Steady nanoseconds between two rounds: none, but behind a recording that is almost a moment."""
+        return max(0, LEAST_ROUND_NS - round((self.end_ns - self.start_ns) / self._rate))
 
     def messages(self) -> Iterator[tuple[RawTopic, int, bytes]]:
         """Topic, arrival [ns] and raw message; every call starts anew."""

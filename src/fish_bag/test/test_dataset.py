@@ -485,6 +485,18 @@ def test_a_folder_without_metadata_is_replayed(tmp_path):
     assert len(list(playback.messages())) == len(samples.robot_messages(0.1))
 
 
+@pytest.mark.parametrize(("apart", "rest"), [(None, 0.1), (1, 0.1), (0.15e9, 0.025), (0.3e9, 0.0)])
+def test_a_loop_over_a_moment_rests_between_its_rounds(tmp_path, apart, rest):
+    with samples.McapRecording(tmp_path / "a") as recording:
+        kind = "std_msgs/msg/Float64"
+        raw = bytes(samples.typestore().serialize_cdr(samples.build.number(1.0), kind))
+        topic = recording.add_topic("/fish/a", kind)
+        for time_ns in (1000, *([] if apart is None else [1000 + round(apart)])):
+            recording.write(topic, time_ns, raw)
+    playback = Playback(ReplayerConfig(str(tmp_path / "a"), rate=2.0, loop=True), "/fish")
+    assert playback.rest_ns == pytest.approx(rest * 1e9, abs=10)
+
+
 def test_quality_of_service_survives(tmp_path):
     with samples.McapRecording(tmp_path / "a") as recording:
         kind, latched = "std_msgs/msg/Float64", Qos(reliable=True, transient_local=True, depth=3)

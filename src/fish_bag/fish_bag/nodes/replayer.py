@@ -115,11 +115,11 @@ class ReplayerNode(Node):
         """Start again, or let the last messages go out and stop."""
         self._rounds += 1
         if self._loop:
-            start = self._playback.start_ns
+            start, rest = self._playback.start_ns, self._playback.rest_ns
             self._messages = self._playback.messages()
             self._next, self._next_tick = next(self._messages), start
-            self._time.restart(start, time.monotonic_ns())
-            self._due.timer_period_ns = 1
+            self._time.restart(start, time.monotonic_ns() + rest)
+            self._due.timer_period_ns = max(1, rest)
             self._due.reset()
             return
         for publisher in self._publishers_of.values():
