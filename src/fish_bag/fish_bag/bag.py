@@ -26,8 +26,8 @@ from fish_bag.storage import (
     Keep,
     StoredTopic,
     name_by_magic,
-    unpack,
     unpack_message,
+    unpack_pieces,
 )
 
 STAMP_PREFIX = 16  # bytes kept of messages nobody decodes: enough for the stamp of a header
@@ -142,14 +142,17 @@ def _scan_data(path: Path, data: Buffer, keep: Keep) -> Contents:
         return scan_ros1(data, keep)
     if kind == "sqlite3":
         return scan_sqlite(path, keep)
-    try:
-        unpacked, whole = unpack(kind, bytes(data))
-    except PACKING_DAMAGE as error:
-        return Contents(lost=[f"its compression {kind} cannot be undone ({error})"])
     with tempfile.TemporaryDirectory() as folder:
         inner = Path(folder) / bare_name(path.name)
-        inner.write_bytes(unpacked)
-        contents = _scan_file(inner, keep) if unpacked else Contents()
+        whole, size = True, 0
+        with inner.open("wb") as file:
+            try:
+                for piece in unpack_pieces(kind, data):
+                    part, whole = piece
+                    size += file.write(part)
+            except PACKING_DAMAGE as error:
+                return Contents(lost=[f"its compression {kind} cannot be undone ({error})"])
+        contents = _scan_file(inner, keep) if size else Contents()
     if not whole:
         contents.lost.insert(0, f"the end of what {kind} packed")
     return contents

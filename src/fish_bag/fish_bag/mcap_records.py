@@ -226,7 +226,7 @@ def whole_chunk(
         if not head.body <= chunk_end <= end:
             continue
         try:
-            records, _ = unpack(head.compression, bytes(data[head.body : chunk_end]))
+            records, _ = unpack(head.compression, bytes(data[head.body : chunk_end]), head.size)
         except PACKING_DAMAGE:
             continue
         if head.checksum:
@@ -243,7 +243,7 @@ def cut_chunk(data: Buffer, head: ChunkHead, content_end: int) -> tuple[bytes, i
     if not head.compression:
         return bytes(data[head.body : head.end]), content_end - head.body
     try:
-        records, _ = unpack(head.compression, bytes(data[head.body : content_end]))
+        records, _ = unpack(head.compression, bytes(data[head.body : content_end]), head.size)
     except PACKING_DAMAGE:
         return b"", 0
     return records, len(records)

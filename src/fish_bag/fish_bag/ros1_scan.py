@@ -122,7 +122,7 @@ class _Scan:
         cut = end > self.content_end
         stop = min(end, len(self.data)) if name == "none" else min(end, self.content_end)
         try:
-            records, _ = unpack(name, bytes(self.data[start:stop]))
+            records, _ = unpack(name, bytes(self.data[start:stop]), size)
         except PACKING_DAMAGE as error:
             self.lost.append(f"chunk at byte {position} cannot be read ({error})")
             return

@@ -8,8 +8,9 @@ The compression of a whole file, a chunk or a single message is known by its fir
 from __future__ import annotations
 
 from bz2 import BZ2Decompressor
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from math import inf
 from mmap import mmap
 from typing import Any
 
@@ -23,6 +24,8 @@ BLOCK = 1 << 16
 ENOUGH_OTHERS = 8  # messages that show in how many zeros those of a topic end
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # no serialised message begins like this: CDR begins with a zero
 LZ4_MAGIC = b"\x04\x22\x4d\x18"
+PIECE = {"zstd": 1 << 10, "lz4": 1 << 16, "bz2": 1 << 10}  # bytes that unpack to at most 32 MiB
+LEAST_LIMIT = 1 << 24  # bytes to which a chunk may unpack whatever its damaged head says
 COMPRESSIONS = ("", "none", "zstd", "lz4", "bz2")  # names of compressions; the first two are none
 PACKING_DAMAGE = (zstandard.ZstdError, RuntimeError, MemoryError, OSError, EOFError, ValueError)
 
@@ -139,25 +142,63 @@ def _decompressor(name: str) -> Any:
     raise ValueError(f"compression {name!r} is not known; expected zstd, lz4, bz2 or none")
 
 
-def unpack(name: str, packed: bytes) -> tuple[bytes, bool]:
+def unpack(name: str, packed: bytes, stated: int | None = None) -> tuple[bytes, bool]:
     """Unpack all that there is, also where the end is cut off, and whether it is whole.
 
     Args:
         name: "zstd", "lz4", "bz2", or "" or "none" for data that are not packed.
+        stated: bytes that it is said to unpack to; much more is not unpacked. None: without a limit.
 
     Raises:
-        one of DAMAGE: the bytes make no sense, or the compression is unknown.
+        one of PACKING_DAMAGE: the bytes make no sense, or the compression is unknown.
     """
     if name in COMPRESSIONS[:2]:
         return packed, True
-    parts = []
-    while packed:
-        decompressor = _decompressor(name)
-        parts.append(bytes(decompressor.decompress(packed)))
-        if not decompressor.eof:
-            return b"".join(parts), False
-        packed = decompressor.unused_data or b""
-    return b"".join(parts), True
+    limit = inf if stated is None else max(stated, LEAST_LIMIT)
+    parts, count, whole = [], 0, True
+    for piece in unpack_pieces(name, packed, _piece(name, packed, limit)):
+        part, whole = piece
+        parts.append(part)
+        count += len(part)
+        if count > limit:
+            raise ValueError(f"it unpacks to more than the {stated} bytes that its head states")
+    return b"".join(parts), whole
+
+
+def unpack_pieces(name: str, packed: Buffer, piece: int = 0) -> Iterator[tuple[bytes, bool]]:
+    """Unpack piece by piece: what each one gives, and whether the data would be whole if they ended there.
+
+    Args:
+        name: "zstd", "lz4" or "bz2".
+        piece: packed bytes at a time; 0: few enough that none fills the memory.
+
+    Raises:
+        one of PACKING_DAMAGE: the bytes make no sense, or the compression is unknown.
+    """
+    decompressor, position = None, 0
+    while position < len(packed):
+        if decompressor is None or decompressor.eof:
+            decompressor = _decompressor(name)
+        given = bytes(packed[position : position + (piece or PIECE[name])])
+        unpacked = bytes(decompressor.decompress(given))
+        left = len(decompressor.unused_data or b"") if decompressor.eof else 0
+        position += len(given) - left
+        yield unpacked, decompressor.eof
+
+
+def _piece(name: str, packed: bytes, limit: float) -> int:
+    """Packed bytes at a time: all where nothing is limited or where the data themselves say that they fit."""
+    if limit == inf:
+        return len(packed)
+    if name != "zstd":
+        return PIECE.get(name, 0)
+    try:
+        stated = zstandard.frame_content_size(packed)
+    except zstandard.ZstdError:  # not even the head of a frame
+        return len(packed)
+    if stated > limit:
+        raise ValueError(f"it states that it unpacks to {stated} bytes")
+    return len(packed) if stated >= 0 else PIECE[name]
 
 
 def name_by_magic(head: bytes) -> str:

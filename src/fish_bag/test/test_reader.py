@@ -15,9 +15,11 @@ from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 
+import lz4.frame
 import numpy as np
 import pytest
 import yaml
+import zstandard
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 from rosbags.interfaces import Nodetype
@@ -31,6 +33,7 @@ from fish_bag.layout import MAX_LAYOUTS, LayoutError, decode_blocks, find_layout
 from fish_bag.message_types import message_type, typestore
 from fish_bag.recover import recover
 from fish_bag.sample_recordings import WRITERS
+from fish_bag.storage import LEAST_LIMIT, unpack, unpack_pieces
 from fish_bag.topic_map import DEFAULT_RULES, TopicRule
 
 
@@ -261,6 +264,48 @@ def test_reserved_records_in_a_row_are_left_out_and_said(tmp_path):
     struct.pack_into("<Q", data, len(data) - 28, first)  # where the summary begins now
     path.write_bytes(data)
     assert "0x10" in holds_the_robot(read_trial(path))
+
+
+PACKERS = {
+    "zstd": zstandard.ZstdCompressor().compress,
+    "zstd without its size": zstandard.ZstdCompressor(write_content_size=False).compress,
+    "lz4": lz4.frame.compress,
+    "bz2": bz2.compress,
+}
+
+
+@pytest.mark.parametrize("packer", PACKERS)
+def test_no_more_is_unpacked_than_was_stated(packer):
+    name, pack = packer.split()[0], PACKERS[packer]
+    packed = pack(bytes(LEAST_LIMIT + 1))
+    with pytest.raises(ValueError, match="unpacks to"):
+        unpack(name, packed, 1000)
+    data, whole = unpack(name, packed, LEAST_LIMIT + 1)
+    assert (len(data), whole) == (LEAST_LIMIT + 1, True)
+
+
+@pytest.mark.parametrize("packer", PACKERS)
+def test_pieces_are_what_was_packed(packer):
+    name, pack = packer.split()[0], PACKERS[packer]
+    data = [np.random.default_rng(k).bytes(5000 + k) for k in range(3)]
+    packed = b"".join(map(pack, data))
+    for piece in (0, 1, 77, len(packed)):
+        parts = list(unpack_pieces(name, packed, piece))
+        assert b"".join(part for part, _ in parts) == b"".join(data)
+        assert parts[-1][1]
+    assert not list(unpack_pieces(name, packed[:-1]))[-1][1]
+
+
+@pytest.mark.parametrize("cut", [0, 40])
+def test_a_packed_file_is_unpacked_into_a_file(tmp_path, cut):
+    content = PACKERS["zstd"](write(tmp_path / "a.mcap").read_bytes())
+    path = tmp_path / "packed.mcap.zst"
+    path.write_bytes(content[: len(content) - cut])
+    if not cut:
+        holds_the_robot(read_trial(path))
+        return
+    with pytest.raises(RecordingError, match="the end of what zstd packed"):
+        read_trial(path)
 
 
 def test_an_unknown_compression_of_a_chunk_is_named(tmp_path):
