@@ -14,6 +14,9 @@ from urllib.parse import urlsplit
 
 LONGEST_BODY = 1024  # bytes; the page sends none
 WRONG_LENGTH = b"the length of the body is none of 0 to 1024 bytes"
+IDLE_S = (
+    10.0  # s after which a connection without a request is closed; the page asks ten times a second
+)
 HEADER = "X-Robot-Fish"  # a page of another site cannot send it without asking first
 WRONG_HOST = b"wrong host; open this view by the address of its computer, such as 127.0.0.1"
 Act = Callable[[bool], None]  # True arms, False disarms
@@ -61,6 +64,7 @@ class ViewServer:
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
+    timeout = IDLE_S
     view: ViewServer
     page: bytes
     act: tuple[Act | None]  # a plain function in a class would become a method

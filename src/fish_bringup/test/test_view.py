@@ -19,7 +19,7 @@ from fish_bag import find_trials
 from fish_bag.trial import NOT_FINITE, Camera, Commands, Imu, Odometry, Trial
 from fish_bringup.excite_check import LONGEST_GAPS, commands_of, incomplete
 from fish_bringup.verbs.latency import all_measured, measured, table, together
-from fish_bringup.view_server import HEADER, ViewServer
+from fish_bringup.view_server import HEADER, ViewServer, _Handler
 from fish_bringup.view_state import TRAIL, ViewConfig, ViewState
 from fish_control.excitation import Program, Row
 from fish_control.offset_sums import ClockEstimate
@@ -185,6 +185,14 @@ def test_a_body_is_not_awaited_before_its_sender_and_length_are_judged(
     answer = connection.getresponse()
     assert (answer.status, answer.will_close, asked) == (status, True, [])
     connection.close()
+
+
+def test_a_connection_without_a_request_is_closed(served, monkeypatch):
+    monkeypatch.setattr(_Handler, "timeout", 0.1)
+    server = served()
+    with socket.create_connection(("127.0.0.1", server.port), timeout=20) as idle:
+        assert idle.recv(1) == b""
+    assert ask(server.url)
 
 
 def test_a_body_that_is_not_read_is_no_request(served):
