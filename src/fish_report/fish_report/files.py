@@ -101,11 +101,30 @@ def new_folder(out: Path | None, name: str) -> Path:
 
 def write_json(path: Path, content: Any, private: bool = False) -> None:
     """Write indented JSON in one step: a reader never sees half of it. private: for the owner's eyes only."""
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(plain(content), indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    if private:
-        part.chmod(0o600)
-    os.replace(part, path)
+    write_whole(path, json.dumps(plain(content), indent=1, allow_nan=False) + "\n", private)
+
+
+def write_whole(path: Path, text: str, private: bool = False, errors: str = "strict") -> None:
+    """Write a text in one step: what was there stays until all is written. A device or a pipe is written to itself.
+
+    Args:
+        private: for the owner's eyes only, from the first byte on.
+        errors: what is done with characters that UTF-8 lacks, as in `str.encode`.
+    """
+    content = text.encode("utf-8", errors)
+    if path.exists() and not path.is_file():
+        path.write_bytes(content)
+        return
+    path = path.resolve() if path.is_symlink() else path
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.unlink(missing_ok=True)  # one of an earlier run would keep its mode
+        mode = 0o600 if private else 0o666  # less what the umask takes away
+        with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
+            file.write(content)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def number(value: float | None, absent: float = math.nan) -> float:

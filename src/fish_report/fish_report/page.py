@@ -13,6 +13,8 @@ import plotly.graph_objects as go
 from jinja2 import Environment
 from plotly.offline import get_plotlyjs
 
+from fish_report.files import write_whole
+
 FONT = "system-ui, sans-serif"
 
 
@@ -60,7 +62,7 @@ Block = Text | Table | Figure
 
 
 def write_page(path: Path, title: str, lead: str, blocks: Sequence[Block]) -> None:
-    """Write title, one leading sentence and the blocks in order."""
+    """Write title, one leading sentence and the blocks in order; an earlier page stays until this one is whole."""
     template = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(
         files(__package__).joinpath("page.html.j2").read_text(encoding="utf-8")
     )
@@ -68,7 +70,7 @@ def write_page(path: Path, title: str, lead: str, blocks: Sequence[Block]) -> No
         title=title, lead=lead, blocks=blocks, plotlyjs=get_plotlyjs(), font=FONT
     )
     # names of files may hold bytes that are no UTF-8
-    path.write_text(page, encoding="utf-8", errors="backslashreplace")
+    write_whole(path, page, errors="backslashreplace")
 
 
 def styled(figure: go.Figure, height: int = 320, titled: bool = False) -> go.Figure:

@@ -25,7 +25,7 @@ from fish_report.files import (
     writable_folder,
     write_json,
 )
-from fish_report.page import Table
+from fish_report.page import Table, write_page
 from fish_report.parallel import at_end_of_worker, worker_pool
 from fish_report.printable import LONGEST
 from fish_report.terminal import print_table, say, terminal
@@ -79,6 +79,47 @@ def test_a_result_replaces_no_input(tmp_path):
         writable_folder(tmp_path, names=("report.html", "robot.yaml"), inputs=inputs)
     assert writable_folder(tmp_path, names=("model.yaml",), inputs=inputs) == tmp_path
     assert writable_file(tmp_path / "a" / "model.yaml", inputs=inputs).parent.is_dir()
+
+
+def test_outputs_of_one_stem_do_not_share_a_draft(tmp_path):
+    (tmp_path / "a.part").write_text("mine")
+    write_json(tmp_path / "a.json", 1)
+    assert (tmp_path / "a.part").read_text() == "mine"
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.json", "a.part"]
+
+
+def test_private_content_is_never_open_to_others(tmp_path, monkeypatch):
+    modes = []
+    replace = os.replace
+
+    def watched(part, path):
+        modes.append(part.stat().st_mode & 0o777)
+        replace(part, path)
+
+    monkeypatch.setattr(os, "replace", watched)
+    monkeypatch.setattr(Path, "chmod", lambda *_: pytest.fail("too late"))
+    (tmp_path / "a.json.part").write_text("of an earlier run, open to all")
+    write_json(tmp_path / "a.json", 1, private=True)
+    assert modes == [0o600]
+    assert (tmp_path / "a.json").stat().st_mode & 0o777 == 0o600
+
+
+def test_a_page_that_cannot_be_written_leaves_the_earlier_one(tmp_path, monkeypatch):
+    page = tmp_path / "page.html"
+    page.write_text("earlier")
+    link = tmp_path / "link.html"
+    link.symlink_to(page)
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
+        with pytest.raises(OSError, match="disk full"):
+            write_page(page, "title", "lead", [])
+    assert page.read_text() == "earlier"
+    write_page(link, "title", "lead \udcff", [])
+    assert link.is_symlink()
+    assert "lead \\udcff" in page.read_text()
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["link.html", "page.html"]
+    write_page(Path(os.devnull), "title", "lead", [])
+    assert not Path(os.devnull).is_file()
 
 
 def test_what_is_not_finite_is_null_and_all_else_stays(tmp_path):
