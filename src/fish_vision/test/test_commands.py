@@ -7,10 +7,13 @@ Requests to the page that are no clicks are refused, and the points come back.
 
 import json
 import re
+import socket
+import struct
 import subprocess
 import sys
 import threading
 import urllib.error
+import urllib.parse
 import urllib.request
 from dataclasses import replace
 from pathlib import Path
@@ -541,6 +544,25 @@ def test_the_points_that_were_clicked_come_back(visit: Visit) -> None:
     assert json.loads(answer) == {"text": "1 set", "picture": ""}
     assert visit.previews == [{"a": (3.0, 4.5)}]
     assert visit.finish() == {"a": (1.0, 2.0), "b": (39.5, 29.5)}
+
+
+def test_connections_without_a_request_keep_nobody_waiting(visit: Visit) -> None:
+    """Browsers open some in advance."""
+    place = urllib.parse.urlsplit(visit.page.address)
+    with (
+        socket.create_connection((place.hostname, place.port)),
+        socket.create_connection((place.hostname, place.port)),
+    ):
+        assert visit.ask("")[0] == 200
+        assert visit.finish() == {"a": (1.0, 2.0), "b": (39.5, 29.5)}
+
+
+def test_a_browser_that_goes_is_not_reported(visit: Visit, capfd) -> None:
+    place = urllib.parse.urlsplit(visit.page.address)
+    with socket.create_connection((place.hostname, place.port)) as gone:
+        gone.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # a reset
+    visit.finish()
+    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,10 @@ Every failure is a CalibrationError. The page is on this computer and previews w
 import argparse
 import base64
 import json
+import sys
+import threading
 from collections.abc import Callable, Mapping, Sequence
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,8 @@ from fish_vision.segmentation import Image
 SILENCE_S = 10.0  # s without a picture after which a topic counts as silent
 
 LONGEST = 65536  # bytes of a request
+IDLE_S = 10.0  # s after which a connection without a request is closed
+LOOK_S = 0.1  # s after which the page looks whether the person is done
 PAGE = Path(__file__).with_name("picking_page.html")
 
 
@@ -107,6 +111,18 @@ Points = dict[str, tuple[float, float]]  # name -> u, v, pixels
 Preview = Callable[[Points], tuple[str, Image | None]]  # text and picture for the points set so far
 
 
+class _Server(ThreadingHTTPServer):
+    """A thread for each connection: browsers open some in advance and send nothing on them."""
+
+    daemon_threads = True
+    timeout = LOOK_S
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a browser that has gone."""
+        if not isinstance(sys.exception(), ConnectionError | TimeoutError):
+            super().handle_error(request, client_address)
+
+
 class PickingPage:
     """Serves one picture on 127.0.0.1 until a person has clicked every point.
 
@@ -123,10 +139,13 @@ class PickingPage:
         self._picture = cv2.imencode(".png", picture)[1].tobytes()
         self._size = picture.shape[1::-1]
         self._names, self._preview = list(names), preview
-        self._picked: Points | None = None
+        self._picked: Points = {}
+        self._done, self._previewing = threading.Event(), threading.Lock()
         page = self
 
         class Handler(BaseHTTPRequestHandler):
+            timeout = IDLE_S
+
             def do_GET(self) -> None:
                 page._get(self)
 
@@ -136,7 +155,7 @@ class PickingPage:
             def log_message(self, *_: Any) -> None:  # the terminal belongs to the command
                 pass
 
-        self._server = HTTPServer(("127.0.0.1", port), Handler)
+        self._server = _Server(("127.0.0.1", port), Handler)
 
     @property
     def address(self) -> str:
@@ -146,7 +165,7 @@ class PickingPage:
     def wait(self) -> Points:
         """Answer requests until the person is done; the points, pixels."""
         try:
-            while self._picked is None:
+            while not self._done.is_set():
                 self._server.handle_request()
         finally:
             self._server.server_close()
@@ -172,13 +191,17 @@ class PickingPage:
             _answer(request, 400, "text/plain", str(error).encode())
             return
         if request.path == "/preview":
-            text, picture = self._preview(points)
+            with self._previewing:
+                text, picture = self._preview(points)
             shown = "" if picture is None else base64.b64encode(to_jpeg(picture, 90)).decode()
             body = json.dumps({"text": text, "picture": shown}).encode()
             _answer(request, 200, "application/json", body)
         elif request.path == "/done" and set(points) == set(self._names):
             self._picked = points
-            _answer(request, 200, "text/plain", b"saved")
+            try:
+                _answer(request, 200, "text/plain", b"saved")
+            finally:
+                self._done.set()
         else:
             _answer(request, 400, "text/plain", b"expected every point to be set")
 
