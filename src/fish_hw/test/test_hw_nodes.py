@@ -30,7 +30,6 @@ from std_srvs.srv import SetBool, Trigger
 from fish_hw.devices.imu_sample import ImuSample
 from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.rudder_driver import RudderDriver
-from fish_hw.devices.usb_camera import jpeg_size
 from fish_hw.emulators.pwm import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
 from fish_hw.nodes.camera import CameraNode
@@ -44,6 +43,7 @@ from fish_hw.protocol import iquart
 from fish_hw.transport.sysfs_pwm import SysfsPwm
 from fish_node import arming, rivals
 from fish_node.camera_file import CameraFileError, read_camera_file
+from fish_node.picture_size import jpeg_size
 
 pytestmark = pytest.mark.ros
 DOMAIN = 176 + os.getpid() % 50  # tests of other packages, below, run at the same time
@@ -567,6 +567,10 @@ def test_a_calibration_of_camera_calibration_is_saved_and_used(graph, tmp_path, 
         ({"k": [0.0] * 9}, "focal lengths 0, 0"),
         ({"distortion_model": "curved"}, "expected one of plumb_bob"),
         ({"d": [math.nan] * 5}, "expected 5 or 4 or 0 finite numbers"),
+        ({"d": [1e300] * 5}, "expected a distortion in which every corner"),
+        ({"k": [1e300, 0, 80, 0, 1, 60, 0, 0, 1]}, "focal lengths 1e+300, 1, expected"),
+        ({"r": np.zeros(9)}, "rectification_matrix is [0, 0, 0, 0, 0, 0, 0, 0, 0], expected"),
+        ({"p": np.zeros(12)}, "projection_matrix has focal lengths 0, 0, expected"),
     ],
 )
 def test_an_impossible_calibration_is_refused_and_the_file_kept(graph, tmp_path, changed, said):

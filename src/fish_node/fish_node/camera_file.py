@@ -18,10 +18,15 @@ from typing import Any
 import yaml
 
 from fish_node.camera_document import WRONG, parse
+from fish_node.lens_check import (
+    COEFFICIENTS,
+    Fault,
+    distortion_fault,
+    matrix_fault,
+    rectification_fault,
+)
 from fish_node.packed_file import packed_as
 
-# numbers of coefficients that each model may have; none and four of plumb_bob are five with zeros
-COEFFICIENTS = {"plumb_bob": (5, 4, 0), "rational_polynomial": (8,), "equidistant": (4,)}
 # OpenCV's rational model gives 14: behind the 8 those of a thin prism and a tilted sensor, zero unless they were asked for
 LONGER = (8, 12, 14)
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -32,6 +37,12 @@ ALIASES = {
     "kannala_brandt4": "equidistant",
 }
 LONGEST = 100  # characters of a foreign text in a message
+NAMES = {  # field of sensor_msgs/CameraInfo -> that of a camera file
+    "k": "camera_matrix",
+    "d": "distortion_coefficients",
+    "r": "rectification_matrix",
+    "p": "projection_matrix",
+}
 
 
 class CameraFileError(ValueError):
@@ -73,30 +84,20 @@ def read_camera_file(path: Path) -> CameraFile:
     fields = _Fields(path, document)
     model, distortion = fields.distortion()
     K = fields.numbers("camera_matrix", (9,))
-    if K[0] < 1.0 or K[4] < 1.0:
-        raise fields.wrong(
-            "camera_matrix", f"has focal lengths {K[0]:g}, {K[4]:g}", "those of a calibrated camera"
-        )
+    fields.refuse(matrix_fault(K))
     size = fields.whole("image_width"), fields.whole("image_height")
-    if (K[1], K[3], *K[6:9]) != (0.0, 0.0, 0.0, 0.0, 1.0):
-        raise fields.wrong(
-            "camera_matrix", f"is {_short(str(K))}", "fx 0 cx, 0 fy cy, 0 0 1 row by row"
-        )
     if not (0.0 < K[2] < size[0] and 0.0 < K[5] < size[1]):
         raise fields.wrong(
             "camera_matrix",
-            f"has its centre at {K[2]:g}, {K[5]:g}",
+            f"has its centre at {K[2]:.4g}, {K[5]:.4g}",
             f"one inside the image of {size[0]} x {size[1]}; calibrate at the image size that is used",
         )
+    fields.refuse(distortion_fault(size, model, K, distortion))
     plain = (*K[0:3], 0.0, *K[3:6], 0.0, *K[6:9], 0.0)
-    return CameraFile(
-        *size,
-        model,
-        distortion,
-        K,
-        fields.numbers("rectification_matrix", (9,), IDENTITY),
-        fields.numbers("projection_matrix", (12,), plain),
-    )
+    R = fields.numbers("rectification_matrix", (9,), IDENTITY)
+    P = fields.numbers("projection_matrix", (12,), plain)
+    fields.refuse(rectification_fault(R, P))
+    return CameraFile(*size, model, distortion, K, R, P)
 
 
 def write_camera_file(path: Path, camera: CameraFile, name: str) -> None:
@@ -153,6 +154,11 @@ class _Fields:
 
     def wrong(self, name: str, what: str, expected: str) -> CameraFileError:
         return CameraFileError(f"{self._path}: {name} {what}, expected {expected}")
+
+    def refuse(self, fault: Fault | None) -> None:
+        """Raise what a check has found, if anything."""
+        if fault is not None:
+            raise self.wrong(NAMES[fault.field], fault.came, fault.expected)
 
     def absent(self, name: str) -> CameraFileError:
         held = ", ".join(map(str, list(self._document)[:12])) or "nothing"

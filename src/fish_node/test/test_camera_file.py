@@ -26,6 +26,7 @@ FILE = {
         "data": [500, 0, 450, 0, 0, 510, 290, 0, 0, 0, 1, 0],
     },
 }
+RATIONAL = [0.2, 0.03, 0.001, -0.002, 0.01, 0.3, 0.06, 0.02]
 
 
 def written(tmp_path, content):
@@ -44,8 +45,8 @@ def changed(model, data):
         ("plumb_bob", [-0.3, 0.1, 0.0, 0.0], (-0.3, 0.1, 0.0, 0.0, 0.0)),
         ("plumb_bob", [-0.3, 0.1, 0.0, 0.0, 0.2], (-0.3, 0.1, 0.0, 0.0, 0.2)),
         ("plumb_bob", [], (0.0,) * 5),
-        ("rational_polynomial", [0.1] * 8, (0.1,) * 8),
-        ("rational_polynomial", [0.1] * 8 + [0.0] * 6, (0.1,) * 8),
+        ("rational_polynomial", RATIONAL, tuple(RATIONAL)),
+        ("rational_polynomial", RATIONAL + [0.0] * 6, tuple(RATIONAL)),
         ("equidistant", [0.05, 0.04, -0.02, 0.004], (0.05, 0.04, -0.02, 0.004)),
     ],
 )
@@ -95,6 +96,37 @@ def test_what_file_storage_writes_is_taken(tmp_path, count):
         ({"distortion_coefficients": {"data": [0.1] * 3}}, "expected 5 or 4 or 0 finite numbers"),
         ({"distortion_coefficients": {"data": [float("nan")] * 5}}, "finite numbers"),
         ({"projection_matrix": {"data": "x" * 500}}, "expected 12 finite numbers"),
+        *(
+            (changed(model, data), r"distortion_coefficients is \[.* of its own; calibrate")
+            for model, data in (
+                ("plumb_bob", [-0.9, 0.0, 0.0, 0.0]),
+                ("plumb_bob", [1e300] * 5),
+                ("plumb_bob", [0.0, 0.0, 1e3, 0.0]),
+                ("equidistant", [-5.0, 0.0, 0.0, 0.0]),
+            )
+        ),
+        *(
+            (changed(model, data), "at most 2 times as far out")
+            for model, data in (
+                ("plumb_bob", [100.0, 0.0, 0.0, 0.0]),
+                ("plumb_bob", [0.0, 0.0, 0.0, 0.0, 1e4]),
+                ("rational_polynomial", [0.0] * 5 + [-5.0, 0.0, 0.0]),
+            )
+        ),
+        (
+            {"camera_matrix": {"data": [1e300, *K[1:4], 1.0, *K[5:]]}},
+            r"focal lengths 1e\+300, 1, expected less than 1e\+06 pixels",
+        ),
+        (
+            {"camera_matrix": {"data": [*K[:4], 3.0, *K[5:]]}},
+            "538.6, 3, expected two of which none",
+        ),
+        ({"rectification_matrix": {"data": [0.0] * 9}}, "expected a rotation"),
+        ({"projection_matrix": {"data": [0.0] * 12}}, "projection_matrix has focal lengths 0, 0"),
+        (
+            {"projection_matrix": {"data": [*K[:3], 0.0, *K[3:6], 0.0, 5.0, 5.0, 0.0, 0.0]}},
+            r"last row \[5, 5, 0, 0\], expected 0 0 1 0",
+        ),
     ],
 )
 def test_errors_name_file_and_field_in_one_short_line(tmp_path, change, expected):
@@ -264,11 +296,11 @@ def test_a_pointer_in_place_of_the_file_is_named(tmp_path):
 @pytest.mark.parametrize("count", [12, 14])
 def test_the_rational_model_of_opencv_has_more_coefficients_which_are_zero(tmp_path, model, count):
     """calibrateCamera with CALIB_RATIONAL_MODEL returns 14; a thin prism is another model."""
-    document = changed("rational_polynomial", [0.1] * 8 + [0.0] * (count - 8))
+    document = changed("rational_polynomial", RATIONAL + [0.0] * (count - 8))
     if model is None:
         del document["distortion_model"]
     camera = read_camera_file(written(tmp_path, document))
-    assert (camera.model, camera.distortion) == ("rational_polynomial", (0.1,) * 8)
+    assert (camera.model, camera.distortion) == ("rational_polynomial", tuple(RATIONAL))
     document["distortion_coefficients"]["data"][-1] = 0.01
     with pytest.raises(CameraFileError, match="thin prism"):
         read_camera_file(written(tmp_path, document))

@@ -19,6 +19,14 @@ from fish_node.camera_file import (
     read_camera_file,
     to_document,
 )
+from fish_node.lens_check import (
+    COEFFICIENTS,
+    OFF_MAX,
+    corners_of,
+    distortion_fault,
+    listed,
+    matrix_fault,
+)
 from fish_node.pool import LENGTH, WIDTH
 
 Array = NDArray[Any]  # float64
@@ -26,13 +34,7 @@ Array = NDArray[Any]  # float64
 R_DOWN = np.diag(
     [1.0, -1.0, -1.0]
 )  # optical axes of an untilted camera: right = pool x, down = pool -y
-MODELS = {  # distortion model -> number of coefficients
-    "plumb_bob": 5,
-    "rational_polynomial": 8,
-    "equidistant": 4,
-}
 POOL = (LENGTH, WIDTH)  # m, along pool x and y
-FOCAL_MIN = 1.0  # pixels; a real lens has hundreds
 NEAREST = 0.01  # m from the camera down to the plane of the markers
 
 
@@ -80,14 +82,17 @@ class Lens:
             )
         if len(k) != 9 or not all(isfinite(v) for v in [*k, *d]):
             raise CalibrationError("camera_info has numbers missing or not finite in k or d")
-        if k[0] < FOCAL_MIN or k[4] < FOCAL_MIN:
+        if fault := matrix_fault(k):
             raise CalibrationError(
-                f"camera_info has focal lengths {k[0]}, {k[4]}: the camera is not calibrated; run calibrate"
+                f"camera_info: k {fault.came}, expected {fault.expected}: the camera is not calibrated; run calibrate"
             )
-        if len(d) and (model not in MODELS or len(d) > MODELS[model]):
+        if len(d) and len(d) not in COEFFICIENTS.get(model, ()):
+            counts = {name: count[0] for name, count in COEFFICIENTS.items()}
             raise CalibrationError(
-                f"camera_info has distortion model {model!r} with {len(d)} coefficients: expected {MODELS}"
+                f"camera_info has distortion model {model!r} with {len(d)} coefficients: expected {counts}"
             )
+        if fault := distortion_fault((width, height), model, k, d):
+            raise CalibrationError(f"camera_info: d {fault.came}, expected {fault.expected}")
         fisheye = model == "equidistant"
         D = np.zeros(4 if fisheye else 5 if len(d) <= 5 else 8)
         D[: len(d)] = d
@@ -158,17 +163,18 @@ class Calibration:
             )
 
     def _check_lens_invertible(self) -> None:
-        """Every pixel must have a ray, or the first picture would find out; a fisheye's corners may see the horizon."""
-        width, height = self.lens.size
-        corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], float)
-        if self.lens.fisheye:
-            corners = 0.5 * (corners + np.array([width, height]) / 2.0)
+        """Every pixel must have a ray that leads back to it, or the poses were wrong without a word."""
+        lens = self.lens
+        middle = np.array(lens.size) / 2.0
+        corners = corners_of(lens.size, lens.fisheye) - middle
+        pixels = middle + (np.array([0.25, 0.5, 0.75, 1.0])[:, None, None] * corners).reshape(-1, 2)
         with np.errstate(all="ignore"):
-            rays = undistort(corners, self.lens)
-        if not np.isfinite(rays).all():
+            off = np.hypot(*(_distort(undistort(pixels, lens), lens) - pixels).T)
+        if not (off < OFF_MAX).all():
             raise CalibrationError(
-                f"camera_info has focal lengths {self.lens.K[0, 0]}, {self.lens.K[1, 1]} and distortion "
-                f"{self.lens.D.tolist()}, which no lens has: run calibrate"
+                f"camera_info has focal lengths {lens.K[0, 0]:.4g}, {lens.K[1, 1]:.4g} and distortion "
+                f"{listed(lens.D.tolist())}, which no lens has: a pixel that is undistorted and distorted again is up to "
+                f"{off.max():.4g} pixels off, expected less than {OFF_MAX:g}; run calibrate"
             )
 
     def pool_to_pixel(self, points: ArrayLike) -> Array:

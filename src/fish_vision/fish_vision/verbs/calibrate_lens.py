@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from fish_vision.calibrate import LensFit, find_board, lens_from_chessboards
-from fish_vision.calibration import CalibrationError, lens_document
+from fish_vision.calibration import CalibrationError, Lens, lens_document
 from fish_vision.segmentation import Image
 from fish_vision.verbs.pictures import from_topic, new_file, read_pictures, write_picture
 
@@ -45,7 +45,7 @@ def add_parser(verbs: Any) -> None:
 
 
 def calibrate_lens(args: argparse.Namespace) -> None:
-    """Write a camera calibration file and a picture of where the boards were."""
+    """Write a camera calibration file and a picture of where the boards were; nothing of a lens that cannot be."""
     out, marked = new_file(args.out), new_file(args.picture)
     corners = _corners(args)
     if bool(args.pictures) == bool(args.topic):
@@ -56,6 +56,8 @@ def calibrate_lens(args: argparse.Namespace) -> None:
     else:
         pictures = read_pictures(args.pictures)
     fit = lens_from_chessboards(pictures, corners, args.square, args.fisheye)
+    found = fit.lens
+    Lens.from_camera_info(*found.size, found.model, found.K.ravel().tolist(), found.D.tolist())
     write_picture(marked, drawn(pictures[fit.used[0]], fit))
     out.write_text(yaml.safe_dump(lens_document(fit.lens, "overhead"), sort_keys=False))
     each_metre = 1e3 * fit.rms / float(np.sqrt(fit.lens.K[0, 0] * fit.lens.K[1, 1]))
