@@ -287,8 +287,11 @@ def test_a_button_arms_while_the_deadman_is_held_and_the_throttle_at_rest(driven
     assert all(asked)
     until(lambda: press(DEADMAN, ARM) and len(asked) > refused and node.answer != "")
     assert disarmed == []
-    until(lambda: press(STOP) and disarmed)
+    before = len(asked)
+    until(lambda: press(DEADMAN, STOP, ARM) and disarmed)
     assert disarmed[0].data == "stopped by a button of the gamepad"
+    assert not node.drive.held(time.monotonic())
+    assert len(asked) == before
 
 
 def test_arrow_keys_come_as_words_and_others_as_characters():

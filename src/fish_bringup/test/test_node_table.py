@@ -392,6 +392,8 @@ def test_the_launch_file_refuses_an_unknown_robot(launched):
 def test_the_launch_file_refuses_another_time_for_a_real_robot(launched):
     with pytest.raises(RuntimeError, match="real_time_factor:=2 is for robot:=sim and robot:=fake"):
         launched(robot="real", real_time_factor="2")
+    with pytest.raises(RuntimeError, match="use_sim_time:=true is for robot:=sim and robot:=fake"):
+        launched(robot="real", use_sim_time="true")
 
 
 @pytest.mark.parametrize(
@@ -412,7 +414,7 @@ def test_only_arguments_that_are_given_override_a_robots_own_values(
     own = [tmp_path / "planner.yaml", tmp_path / "fusion.yaml"]
     for file in own:
         file.touch()
-    nodes = launched(robot="real", config=str(tmp_path), **given)
+    nodes = launched(robot="real", part="shore", config=str(tmp_path), **given)
     installed = [
         str(node_table.parameter_path(spec))
         for spec in (node_table.CONTROL[2], node_table.CONTROL[1])

@@ -1031,8 +1031,9 @@ def test_exciter_stops_for_good_where_the_guard_finds_a_reason(bench, tmp_path, 
 
 def arm(b):
     """As the owner of the arming state says it."""
-    armed = DiagnosticStatus(level=DiagnosticStatus.OK, message="armed")
-    b.say("arming/state", DiagnosticArray(status=[armed]))
+    armed = DiagnosticArray(status=[DiagnosticStatus(level=DiagnosticStatus.OK, message="armed")])
+    b.say("arming/state", armed)
+    b.other.create_timer(0.05, lambda: b.say("arming/state", armed))
     b.until(lambda: b.node._arming.armed)
 
 

@@ -371,6 +371,7 @@ def test_another_owner_of_the_arming_state_forbids_to_arm_while_it_is_there(
     g = graph(RotorNode, port=vertiq_emulator.port, **PATIENT)
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     simulator = g.peer.create_publisher(DiagnosticArray, "arming/state", 10)
+    simulator.publish(b"no message at all")  # bytes that are none end no node
     status = DiagnosticStatus(level=DiagnosticStatus.OK, hardware_id="/fish/simulator 0123abcd")
     asks = g.arming(publisher)
     assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, asks)
@@ -403,10 +404,19 @@ def test_rudder_follows_and_centres(graph, tmp_path):
     owner = g.peer.create_publisher(DiagnosticArray, "arming/state", 10)
     armed = DiagnosticArray(status=[DiagnosticStatus(level=DiagnosticStatus.OK, message="armed")])
 
-    def each() -> None:
+    def recorded() -> None:
         publisher.publish(command(rudder=0.5))
+        armed.header.stamp.sec = 1_700_000_000
         owner.publish(armed)
 
+    def each() -> None:
+        publisher.publish(command(rudder=0.5))
+        armed.header.stamp = g.peer.get_clock().now().to_msg()
+        owner.publish(armed)
+
+    said = []
+    assert g.spin(lambda: said.append(chip.read("duty_cycle")) or len(said) > 50, recorded)
+    assert set(said) == {1_500_000}
     assert g.spin(lambda: chip.channel.joinpath("duty_cycle").read_text() == "1786500\n", each)
     assert g.spin(lambda: chip.channel.joinpath("duty_cycle").read_text() == "1500000\n")
     assert g.spin(lambda: bool(diagnostics))
@@ -422,12 +432,17 @@ def test_a_second_owner_does_not_move_the_rudder_of_a_disarmed_robot(graph, tmp_
         DiagnosticStatus(level=DiagnosticStatus.OK, message="armed", hardware_id="/fish/replayer"),
     ]
 
+    def say(index: int) -> None:
+        message = DiagnosticArray(status=states[index : index + 1])
+        message.header.stamp = g.peer.get_clock().now().to_msg()
+        owners[index].publish(message)
+
     def disarmed() -> None:
-        owners[0].publish(DiagnosticArray(status=states[:1]))
+        say(0)
 
     def each() -> None:
         disarmed()
-        owners[1].publish(DiagnosticArray(status=states[1:]))
+        say(1)
         publisher.publish(command(rudder=0.5))
 
     assert g.spin(lambda: g.node._arming.armed is False, disarmed)
@@ -783,3 +798,9 @@ def test_a_port_that_is_absent_for_longer_than_allowed_is_named_and_ends_the_nod
         "rotor: cannot open serial port /dev/ttyX9: there is no such port; available: "
     )
     assert "Traceback" not in output
+
+
+@pytest.mark.parametrize("port", ["/dev/ttyAMA0", "/dev/serial0"])
+def test_a_real_motor_in_simulated_time_is_refused(graph, port):
+    with pytest.raises(ValueError, match=f"use_sim_time is true and port is {port}: a real motor"):
+        graph(RotorNode, port=port, use_sim_time=True)

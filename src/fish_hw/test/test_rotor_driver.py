@@ -418,3 +418,14 @@ def test_a_firmware_without_the_speed_command_is_told(vertiq_emulator, monkeypat
 def test_a_module_without_power_is_told(vertiq_emulator):
     vertiq_emulator.mangle = lambda _: b""
     assert "check its power, wiring" in complaint(vertiq_emulator)
+
+
+@pytest.mark.parametrize("speed", [math.nan, math.inf, -1e300, 1001.0])
+def test_a_speed_that_no_controller_means_disarms(bench, speed):
+    running = lambda: bench.emulator.mode == VELOCITY_MODE  # noqa: E731
+    assert bench.run(20.0, steady, until=running)
+    bench.driver.command(speed)
+    assert bench.driver.arming.reason.startswith(
+        f"commanded speed is {speed:g} rad/s, expected 1000"
+    )
+    assert bench.driver.rejected == 1

@@ -319,3 +319,25 @@ def test_over_a_stall_of_the_computer_nothing_is_judged():
     rotor.run(0.5)
     rotor.t += 0.5
     assert rotor.run(0.3)[1] == ""
+
+
+@pytest.mark.parametrize("period_s", [0.05, 0.06])
+def test_a_jam_is_noticed_with_seldom_samples(period_s):
+    check, seen = MotionCheck(), []
+    for k in range(40):
+        seen.append(check.add(oscillation(k * period_s), RotorSample(k * period_s, 0.0, 0.0)))
+    assert "jammed" in next(filter(None, seen)) or "stuck" in next(filter(None, seen))
+
+
+def test_samples_too_seldom_to_see_a_jam_stop_the_rotor():
+    check, seen = MotionCheck(), []
+    for k in range(40):
+        t = 0.08 * k
+        seen.append(check.add(60.0, RotorSample(t, 60.0 * t, 60.0)))
+    assert "nobody can see a jam: measured speed comes every 0.080 s" in next(filter(None, seen))
+
+
+def test_a_rotor_that_runs_away_between_seldom_samples_is_noticed():
+    check = MotionCheck()
+    check.add(60.0, RotorSample(0.0, 0.0, 60.0))
+    assert "runs away: 400 rad/s" in check.add(60.0, RotorSample(0.08, 30.0, 400.0))

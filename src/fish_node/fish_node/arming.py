@@ -220,15 +220,15 @@ def largest_of(variances: Iterable[float]) -> float:
 
 
 def estimate_trouble(
-    pose_variance: float, twist_variance: float, finite: bool, largest_variance: float
+    pose_variance: float, twist_variance: float, plausible: bool, largest_variance: float
 ) -> str:
     """What is wrong with an estimate of the motion; empty if nothing is.
 
     The variances are the largest of the pose [m^2, rad^2] and of the velocity [m^2/s^2, rad^2/s^2]; one that is no number
     is too large.
     """
-    if not finite:
-        return "odometry/filtered is not finite"
+    if not plausible:
+        return "odometry/filtered is not plausible: a value is not a number, or no fish can have it"
     if not pose_variance <= largest_variance:
         return "camera lost: fusion does not vouch for the pose"
     if not twist_variance <= largest_variance:

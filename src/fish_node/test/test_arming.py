@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Quaternion
 from rclpy.serialization import deserialize_message, serialize_message
 
 from fish_node.arming import (
@@ -27,7 +28,7 @@ from fish_node.arming import (
     largest_of,
     operator_and_estimate,
 )
-from fish_node.nodes.arming import FORGOTTEN_S, ArmingListener, ArmingServer
+from fish_node.nodes.arming import FORGOTTEN_S, ArmingListener, ArmingServer, is_plausible
 from fish_node.rivals import Rivals
 
 COMMAND = Source("joint_command", 0.15)
@@ -178,17 +179,17 @@ def test_an_ignored_estimate_has_no_say():
 
 
 @pytest.mark.parametrize(
-    ("pose", "twist", "finite", "said"),
+    ("pose", "twist", "plausible", "said"),
     [
         (0.1, 0.1, True, ""),
         (1e4, 0.1, True, "camera lost"),
         (0.1, 1e4, True, "IMU lost"),
         (math.nan, 0.1, True, "camera lost"),
-        (0.1, 0.1, False, "not finite"),
+        (0.1, 0.1, False, "not plausible"),
     ],
 )
-def test_what_fusion_does_not_vouch_for_is_lost(pose, twist, finite, said):
-    trouble = estimate_trouble(pose, twist, finite, 1.0)
+def test_what_fusion_does_not_vouch_for_is_lost(pose, twist, plausible, said):
+    trouble = estimate_trouble(pose, twist, plausible, 1.0)
     assert said in trouble
     assert bool(trouble) == bool(said)
 
@@ -381,3 +382,25 @@ def test_a_state_that_was_never_heard_forbids_to_move_where_one_is_required():
     assert bench.listener.forbids(required=True) == bench.listener.forbids(required=False)
     bench.say((ROBOT, True))
     assert bench.listener.forbids(required=True) == ""
+
+
+def test_an_owner_that_fell_silent_forbids_to_move_where_one_is_required():
+    bench = ListenerBench()
+    bench.say((ROBOT, True))
+    bench.now += FORGOTTEN_S + 0.01
+    assert bench.listener.forbids(required=True).startswith("no arming/state for 1 s")
+    assert bench.listener.forbids(required=False) == ""
+
+
+@pytest.mark.parametrize(
+    ("x", "w", "plausible"),
+    [
+        (0.5, 1.0, True),
+        (1e300, 1.0, False),
+        (math.nan, 1.0, False),
+        (0.5, 0.0, False),
+        (0.5, math.nan, False),
+    ],
+)
+def test_a_place_that_no_fish_can_have_is_no_estimate(x, w, plausible):
+    assert is_plausible(x, 0.0, Quaternion(z=0.0, w=w)) is plausible

@@ -25,6 +25,7 @@ from fish_bringup.node_table import (
     NAMESPACE,
     PARTS,
     PILOT,
+    REAL,
     RECORDER,
     ROBOTS,
     SIMULATED,
@@ -136,6 +137,10 @@ def _chosen(chosen: Mapping[str, str]) -> list[NodeSpec]:
         )
     whole = open_loop(ROBOTS[robot]) if chosen["program"] else ROBOTS[robot]
     specs = [spec for spec in whole if in_part(spec, part)]
+    if robot == "real" and REAL[0] in specs and chosen["use_sim_time"].lower() == "true":
+        raise RuntimeError(
+            "use_sim_time:=true is for robot:=sim and robot:=fake; a real motor needs real time"
+        )
     if not _yes(chosen["record"]):
         specs = [spec for spec in specs if spec != RECORDER]
     if _yes(chosen["view"]):

@@ -120,6 +120,9 @@ class HandDrive(Node):
         new, self._pressed = down - self._pressed, down
         if pad.stop in new:
             self._disarm.publish(String(data="stopped by a button of the gamepad"))
+        if pad.stop in down:
+            self.drive.release()
+            return
         if len(axes) <= max(pad.throttle, pad.rudder) or pad.deadman not in down:
             self.drive.release()
             return

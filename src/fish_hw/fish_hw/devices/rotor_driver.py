@@ -5,7 +5,6 @@
 One thread calls step() and owns the port; commands and requests may come from other threads.
 """
 
-import math
 import threading
 import time
 from collections.abc import Callable
@@ -23,6 +22,7 @@ from fish_hw.transport.interfaces import ByteStream, TransportError
 from fish_node.arming import Arming, Source, operator_and_estimate
 
 COMMAND, RUDDER = "joint_command", "word of the rudder"  # sources of the arming state
+MISTAKEN_SPEED = 1000.0  # rad/s; a faster command is a mistake
 MODULE, LEAK = "rotor module", "leak sensor"
 
 
@@ -131,12 +131,14 @@ class RotorDriver:
     def command(self, velocity: float | None) -> None:
         """Take a commanded speed [rad/s]; None stands for a message without one, which does not count as a command.
 
-        A number that is not finite disarms.
+        A number that is none, or that no controller means, disarms.
         """
-        if velocity is None or not math.isfinite(velocity):
+        if velocity is None or not abs(velocity) <= MISTAKEN_SPEED:
             self.rejected += 1
             if velocity is not None:
-                self.arming.disarm(f"commanded speed is {velocity}, expected a finite number")
+                self.arming.disarm(
+                    f"commanded speed is {velocity:g} rad/s, expected {MISTAKEN_SPEED:g} rad/s at most"
+                )
             return
         with self._lock:
             self.guard.command(velocity)

@@ -21,7 +21,8 @@ WAY = 2.0  # rad, shortest commanded way that is judged
 LEAST_SHARE = 0.3  # of the commanded way; a rotor with less is held
 STUCK_SAMPLES = 10  # equal speeds in a row while the command changes
 STUCK_CHANGE = 10.0  # rad/s, change of the command meanwhile
-LONGEST_GAP_S = 0.05  # between samples; over a longer one neither way is known
+LONGEST_GAP_S = 0.065  # between samples; over a longer one a stroke of full throttle may turn half a turn unseen
+MOST_GAPS = 30  # in a row, until nobody watches the rotor: two seconds or more
 RUNAWAY = 60.0  # rad/s beyond every command of the last two windows
 
 TELEMETRY_S = 0.1  # between two answered questions of one kind
@@ -119,7 +120,16 @@ class MotionCheck:
     def restart(self) -> None:
         """Begin again, when the rotor begins to be driven."""
         self._last = None
+        self._gaps = 0  # between samples, too long, in a row
         self._since_s: float | None = None
+        self._forget()
+
+    def _begin(self, command: float, sample: RotorSample) -> None:
+        """Begin again at a sample."""
+        self._forget()
+        self._since_s, self._largest = sample.time_s, abs(command)
+
+    def _forget(self) -> None:
         self._commanded = self._measured = 0.0
         self._largest = self._largest_before = 0.0
         self._equal = 0
@@ -134,12 +144,15 @@ class MotionCheck:
         )  # a sample is of the moment in which its command arrives
         self._largest = max(self._largest, abs(command))
         if last is None:
-            self._since_s = sample.time_s
+            self._begin(command, sample)
             return ""
         dt = sample.time_s - last.time_s
         if dt > LONGEST_GAP_S:
-            self.restart()
-            return ""
+            self._gaps += 1
+            wrong = self._runaway(sample) or self._unwatched(dt)
+            self._begin(command, sample)
+            return wrong
+        self._gaps = 0
         self._commanded += abs(command) * dt
         self._measured += abs(sample.angle - last.angle)
         return self._stuck(acted, sample, last) or self._runaway(sample) or self._jam(sample)
@@ -153,6 +166,11 @@ class MotionCheck:
         if self._equal >= STUCK_SAMPLES and self._highest - self._lowest > STUCK_CHANGE:
             return f"rotor jammed or encoder stuck: measured speed stands still at {sample.velocity:.1f} rad/s"
         return ""
+
+    def _unwatched(self, dt: float) -> str:
+        if self._gaps < MOST_GAPS:
+            return ""
+        return f"nobody can see a jam: measured speed comes every {dt:.3f} s, expected {LONGEST_GAP_S:g} s or less"
 
     def _runaway(self, sample: RotorSample) -> str:
         limit = max(self._largest, self._largest_before) + RUNAWAY

@@ -18,7 +18,8 @@ from fish_hw.transport.interfaces import TransportError
 
 LONGEST_STEP_S = 0.05  # a cycle that was late must not earn a larger jump
 
-CHECK_S = 1.0  # how often the output is asked whether it still works
+CHECK_S = 0.1  # how often the output is asked whether it still works
+STAYS_S = 1.0  # since it was opened, until it counts as one that works
 SETTLE_S = 0.1  # beyond the time that the slew limit gives
 
 
@@ -50,8 +51,8 @@ class RudderServo:
         self._following = False
 
     def command(self, alpha: float, now: float) -> None:
-        """Take a commanded angle [rad]; numbers that are none are rejected and counted."""
-        if not math.isfinite(alpha):
+        """Take a commanded angle [rad]; what is no number, or more than half a turn, is rejected and counted."""
+        if not abs(alpha) <= math.pi:
             self.counters.rejected += 1
             return
         limit = self._settings.max_angle
@@ -262,7 +263,7 @@ class RudderDriver:
             raise TransportError(
                 "the PWM output stopped by itself or has another period (supply lost, or another program uses it)"
             )
-        return self._link.works()
+        return self._link.works() if now - self._connected_s >= STAYS_S else []
 
     def _travel_s(self) -> float:
         """How long the servo needs to the centre at the most: from the angle that was sent, and right after

@@ -14,6 +14,7 @@ Services: arm (std_srvs/SetBool: true arms, false disarms), ~/clear_faults (std_
 """
 
 import math
+from pathlib import Path
 
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import BatteryState, JointState
@@ -37,11 +38,22 @@ from fish_node.rivals import Rivals
 SECOND_S = 1.0  # between two words of the battery, and two looks for other commanders
 
 
+def require_real_time(simulated: bool, port: str) -> None:
+    """Raise ValueError for a real motor in simulated time, in which no time-out passes while /clock stands still."""
+    emulated = port == "emulator" or Path(port).resolve().is_relative_to("/dev/pts")
+    if simulated and not emulated:
+        raise ValueError(
+            f"use_sim_time is true and port is {port}: a real motor needs real time, expected use_sim_time false, or the "
+            "port emulator or that of a fake robot"
+        )
+
+
 class RotorNode(DeviceNode):
     """Commands in, measurements out; what is allowed is decided in RotorDriver."""
 
     def __init__(self) -> None:
         super().__init__("rotor", RotorSettings)
+        require_real_time(self.clock.simulated, self.settings.port)
         self._joint_states = self.create_publisher(JointState, "joint_states", 10)
         moves = JointState(name=["rotor"], position=[mark(0)], velocity=[mark(1)])
         moves.header.frame_id = self.settings.frame_prefix + self.settings.frame_id
@@ -86,8 +98,10 @@ class RotorNode(DeviceNode):
 
     def _on_command(self, message: JointState) -> None:
         rudder = joint_value(message, "rudder", "position")
-        if rudder is not None and not math.isfinite(rudder):
-            self._driver.arming.disarm(f"commanded rudder is {rudder}, expected a finite number")
+        if rudder is not None and not abs(rudder) <= math.pi:
+            self._driver.arming.disarm(
+                f"commanded rudder is {rudder:g} rad, expected {math.pi:.3g} rad at most"
+            )
         self._driver.command(joint_value(message, "rotor", "velocity"))
 
     def _on_rudder(self, message: String) -> None:

@@ -11,6 +11,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+from builtin_interfaces.msg import Time
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -20,7 +21,7 @@ from fish_hw.devices.rudder_output import open_output
 from fish_hw.emulators.pwm import PwmChipEmulator
 from fish_hw.nodes.device_node import DeviceNode, joint_value, run
 from fish_hw.settings import RudderSettings
-from fish_node.nodes.arming import ArmingListener
+from fish_node.nodes.arming import FORGOTTEN_S, ArmingListener
 from fish_node.nodes.robot_clock import timer_clock
 
 TROUBLE_PERIOD_S = 0.05
@@ -34,7 +35,7 @@ class RudderNode(DeviceNode):
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._driver = RudderDriver(self.settings, self._open_output, self.clock.now)
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
-        self._arming = ArmingListener(self, self._on_state)
+        self._arming = ArmingListener(self, self._on_state, is_new=self._is_new)
         self._trouble = self.create_publisher(String, "rudder/trouble", 10)
         self.create_timer(TROUBLE_PERIOD_S, self._say_trouble, clock=timer_clock(self))
         emulated = self.settings.backend == "emulator"
@@ -54,6 +55,9 @@ class RudderNode(DeviceNode):
     def _on_command(self, message: JointState) -> None:
         alpha = joint_value(message, "rudder", "position")
         self._driver.command(math.nan if alpha is None else alpha)  # counted as rejected
+
+    def _is_new(self, stamp: Time) -> bool:
+        return abs(self.clock.now() - self.clock.of(stamp)) < FORGOTTEN_S
 
     def _on_state(self) -> None:
         self._driver.armed(bool(self._arming.armed))

@@ -15,6 +15,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 from uuid import uuid4
 
 from builtin_interfaces.msg import Time
@@ -43,15 +44,26 @@ from fish_node.arming import (
     visible,
 )
 from fish_node.nodes.message_bytes import MessageBytes
-from fish_node.nodes.quick_messages import BODY, STAMP, hear
+from fish_node.nodes.quick_messages import (
+    BODY,
+    MALFORMED,
+    SELDOM_S,
+    STAMP,
+    hear,
+    malformed,
+    read_stamp,
+)
 
 STATE_PERIOD_S = 0.05
 PLANAR = (0, 7, 35)  # x, y and rotation about z on the diagonal of a covariance of 6
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 ARMED = "armed"
 FORGOTTEN_S = 1.0  # s; an owner says its state more often
+SILENT = f"no arming/state for {FORGOTTEN_S:g} s: the node rotor or simulator is gone"
 NEVER_HEARD = "no arming/state yet: the node rotor or simulator publishes it"
 ONE_TOO_MANY = "stop one of the two, or give it another domain"
+FARTHEST, FASTEST = 1e3, 50.0  # m; m/s and rad/s: more is no motion of a fish
+LEAST_NORM = 0.5  # of an orientation's part about z
 AFTER_STAMP = BODY + STAMP.size  # bytes of a message with a header
 
 
@@ -142,17 +154,19 @@ class ArmingServer:
         pose, twist = message.pose, message.twist
         position, speed = pose.pose.position, twist.twist
         q = pose.pose.orientation
-        values = (position.x, position.y, q.z, q.w, speed.linear.x, speed.linear.y, speed.angular.z)
+        moves = (speed.linear.x, speed.linear.y, speed.angular.z)
         trouble = estimate_trouble(
             largest_of(pose.covariance[i] for i in PLANAR),
             largest_of(twist.covariance[i] for i in PLANAR),
-            all(map(math.isfinite, values)),
+            is_plausible(position.x, position.y, q) and all(abs(v) <= FASTEST for v in moves),
             self._settings.largest_variance,
         )
         self._arming.heard(ODOMETRY, self._clock(), trouble)
 
     def _on_camera(self, message: PoseWithCovarianceStamped) -> None:
-        if self._is_new(CAMERA, message.header.stamp):
+        place = message.pose.pose
+        seen = is_plausible(place.position.x, place.position.y, place.orientation)
+        if seen and self._is_new(CAMERA, message.header.stamp):
             self._arming.heard(CAMERA, self._clock())
 
     def _on_deadman(self, message: Bool) -> None:
@@ -172,7 +186,7 @@ class ArmingServer:
     def _on_state(self, data: bytes) -> None:
         if self._id.encode() in data:  # its own, twenty times a second
             return
-        message = deserialize_message(data, DiagnosticArray)
+        message = state_of(data, self._node)
         others = [status.hardware_id for status in message.status if status.hardware_id != self._id]
         if others:
             trouble = f"{owner(others[0])} says arming/state, too: {ONE_TOO_MANY}"
@@ -191,6 +205,25 @@ class ArmingServer:
         return bool(stamp != before)
 
 
+def is_plausible(x: float, y: float, orientation: Any) -> bool:
+    """Whether a place [m] and an orientation are numbers that a fish in a pool can have."""
+    return (
+        abs(x) <= FARTHEST
+        and abs(y) <= FARTHEST
+        and LEAST_NORM <= math.hypot(orientation.z, orientation.w) <= 1.0 / LEAST_NORM
+    )
+
+
+def state_of(data: bytes, node: Node) -> DiagnosticArray:
+    """The message of these bytes; one without a status where they are none."""
+    try:
+        return deserialize_message(data, DiagnosticArray)
+    except MALFORMED as error:
+        line = malformed(DiagnosticArray, data, error)
+        node.get_logger().warning(f"arming/state: {line}", throttle_duration_sec=SELDOM_S)
+        return DiagnosticArray()
+
+
 def owner(hardware_id: str) -> str:
     """The node in the hardware_id of arming/state."""
     return visible(hardware_id.partition(" ")[0]) or "a node without a name"
@@ -207,6 +240,7 @@ class ArmingListener:
         node: hears arming/state.
         on_state: called after each word of an owner.
         clock: s, monotonic; by it an owner that is silent for FORGOTTEN_S has no say.
+        is_new: whether a stamp is one of now; a word with another, such as that of a recording, is not heard.
     """
 
     def __init__(
@@ -214,25 +248,33 @@ class ArmingListener:
         node: Node,
         on_state: Callable[[], None] = lambda: None,
         clock: Callable[[], float] = time.monotonic,
+        is_new: Callable[[Time], bool] = lambda _: True,
     ) -> None:
         self.armed: bool | None = None
         self.reason = ""
-        self._on_state, self._clock = on_state, clock
+        self._node, self._on_state, self._clock, self._is_new = node, on_state, clock, is_new
         self._known = b""  # the newest message after its stamp
         self._words: dict[str, str] = {}  # of that message: owner -> why disarmed, empty if armed
         self._heard: dict[str, tuple[float, str]] = {}  # owner -> s, the same
         node.create_subscription(DiagnosticArray, "arming/state", self._on_message, 10, raw=True)
 
     def forbids(self, required: bool) -> str:
-        """Why nothing may move; empty if it may. required: a state that was never heard forbids it, too."""
-        return NEVER_HEARD if required and self.armed is None else self.reason
+        """Why nothing may move; empty if it may. required: a state that nobody says, or says any more, forbids it, too."""
+        if not required or self.reason:
+            return self.reason
+        newest = max((heard for heard, _ in self._heard.values()), default=-math.inf)
+        if self.armed is None:
+            return NEVER_HEARD
+        return "" if self._clock() - newest < FORGOTTEN_S else SILENT
 
     def _on_message(self, data: bytes) -> None:
         """Twenty times a second, and mostly what is known but for the stamp."""
+        if len(data) < AFTER_STAMP or not self._is_new(read_stamp(data)):
+            return
         if data[AFTER_STAMP:] != self._known:
             self._known = data[AFTER_STAMP:]
             self._words = {}
-            for status in deserialize_message(data, DiagnosticArray).status:
+            for status in state_of(data, self._node).status:
                 why = "" if status.level == DiagnosticStatus.OK else status.message or "disarmed"
                 self._words[status.hardware_id] = self._words.get(status.hardware_id) or why
         if self._words:

@@ -22,6 +22,7 @@ from geometry_msgs.msg import (
     Vector3Stamped,
 )
 from nav_msgs.msg import Odometry
+from rclpy._rclpy_pybind11 import RMWError
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
@@ -128,20 +129,45 @@ class QuickPose(NamedTuple):
     pose: Any
 
 
-def from_bytes(kind: type, callback: Callable[[Any], object]) -> Callable[[Any], None]:
-    """The callback of a raw subscription to a message of READERS, which hands `callback` the quick form."""
+MALFORMED = (struct.error, RMWError)  # what reading bytes raises that are no such message
+SELDOM_S = 5.0  # between two lines about such bytes
+
+
+def from_bytes(
+    kind: type,
+    callback: Callable[[Any], object],
+    refused: Callable[[str], object] = lambda _: None,
+) -> Callable[[Any], None]:
+    """The callback of a raw subscription to a message of READERS, which hands `callback` the quick form.
+
+    refused: gets a line for bytes that are no such message.
+    """
     read = READERS[kind]
 
     def take(data: bytes) -> None:
-        quick = data[:2] == LITTLE_ENDIAN
-        callback(read(data) if quick else deserialize_message(data, kind))
+        try:
+            message = read(data) if data[:2] == LITTLE_ENDIAN else deserialize_message(data, kind)
+        except MALFORMED as error:
+            refused(malformed(kind, data, error))
+            return
+        callback(message)
 
     return take
 
 
+def malformed(kind: type, data: bytes, error: Exception) -> str:
+    """What is wrong with bytes that came as a message of this kind."""
+    reason = str(error).split("\n")[0]
+    return f"{len(data)} bytes are no {kind.__name__} and are not used ({reason}); look at their publisher"
+
+
 def hear(node: Node, kind: type, topic: str, callback: Callable[[Any], object], qos: Any) -> None:
     """Let `callback` hear a topic with a message of READERS, in the quick form."""
-    node.create_subscription(kind, topic, from_bytes(kind, callback), qos, raw=True)
+
+    def refused(line: str) -> None:
+        node.get_logger().warning(f"{topic}: {line}", throttle_duration_sec=SELDOM_S)
+
+    node.create_subscription(kind, topic, from_bytes(kind, callback, refused), qos, raw=True)
 
 
 def read_odometry(data: bytes) -> QuickOdometry:
