@@ -18,7 +18,6 @@ from fish_control.imu_heading import HeadingNoise, ImuHeading
 from fish_control.imu_history import ImuHistory, inertial_sample
 from fish_control.measurement_buffer import CameraPose, Moment, RawPose, Timeline, start_moment
 from fish_control.motion_models import MotionModels
-from fish_control.stamp_checks import ImuStamps, PoseStamps
 from fish_control.strapdown import MotionModel, NoiseScale, StrapdownFilter
 
 Array = NDArray[np.float64]
@@ -59,7 +58,10 @@ class Fusion:
         self._candidates, self._repeated = checks.AgreeingPoses(), checks.RepeatedPose()
         self._last_pose_time = self._last_imu_time = self._accepted_at = -math.inf  # s
         self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
-        self._imu_stamps, self._pose_stamps = ImuStamps(c.history), PoseStamps(c.history)
+        self._imu_stamps, self._pose_stamps = (
+            checks.ImuStamps(c.history),
+            checks.PoseStamps(c.history),
+        )
         self._models.begin()
         self._filter.model = self._models.current
 

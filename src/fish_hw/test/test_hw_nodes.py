@@ -43,7 +43,7 @@ from fish_hw.protocol import iquart
 from fish_hw.transport.sysfs_pwm import SysfsPwm
 from fish_node import arming, rivals
 from fish_node.camera_file import CameraFileError, read_camera_file
-from fish_node.picture_size import jpeg_size
+from fish_node.file_head import jpeg_size
 
 pytestmark = pytest.mark.ros
 DOMAIN = 176 + os.getpid() % 50  # tests of other packages, below, run at the same time

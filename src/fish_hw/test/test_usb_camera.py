@@ -17,7 +17,7 @@ from fish_hw.emulators.walking_square import WalkingSquare
 from fish_hw.settings import CameraSettings
 from fish_hw.transport.interfaces import PortUnavailable
 from fish_hw.transport.video_capture import Frame, VideoCapture, compressed_frame
-from fish_node.picture_size import jpeg_size
+from fish_node.file_head import jpeg_size
 
 SETTINGS = CameraSettings(device="emulator", width=64, height=48)
 

@@ -18,6 +18,7 @@ from typing import Any
 import yaml
 
 from fish_node.camera_document import WRONG, parse
+from fish_node.file_head import packed_as
 from fish_node.lens_check import (
     COEFFICIENTS,
     Fault,
@@ -25,7 +26,6 @@ from fish_node.lens_check import (
     matrix_fault,
     rectification_fault,
 )
-from fish_node.packed_file import packed_as
 
 # OpenCV's rational model gives 14: behind the 8 those of a thin prism and a tilted sensor, zero unless they were asked for
 LONGER = (8, 12, 14)

@@ -14,6 +14,7 @@ from typing import Any
 
 import yaml
 
+from fish_report.errors import user_errors
 from fish_report.files import read_yaml
 from fish_sim.effects import EFFECTS
 from fish_sim.parameter import Parameter
@@ -33,6 +34,16 @@ def load_robot(path: str | Path) -> Robot:
         return _from_content(read_yaml(path))
     except ValueError as error:
         raise RobotError(f"{path}: {error}") from error
+
+
+def read_model(path: Path | None) -> Robot:
+    """The robot that a command is given as a robot.yaml or model.yaml; None: the nominal robot.
+
+    Raises:
+        UserError: the file is not there or is no robot.
+    """
+    with user_errors():
+        return Robot() if path is None else load_robot(path)
 
 
 def _from_content(content: Any) -> Robot:

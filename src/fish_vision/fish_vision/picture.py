@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from fish_node.picture_size import LARGEST_SIDE, picture_size
+from fish_node.file_head import LARGEST_SIDE, picture_size
 from fish_vision.segmentation import Image
 
 CONVERSIONS = {  # encoding -> channels, conversion to bgr8

@@ -53,7 +53,7 @@ from fish_report.errors import Interruption, UserError, user_errors
 from fish_report.files import new_folder
 from fish_report.page import Table
 from fish_report.terminal import print_table, say, terminal
-from fish_sim.robot_argument import read_model
+from fish_sim.robot_file import read_model
 
 VIEW_PORT = ViewConfig().port
 FULL = 0.75  # share of all cores from which on messages wait for a processor

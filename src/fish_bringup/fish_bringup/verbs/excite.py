@@ -58,7 +58,7 @@ from fish_report.files import new_folder
 from fish_report.page import Table
 from fish_report.terminal import cell, print_table, say, terminal
 from fish_sim.robot import Robot
-from fish_sim.robot_argument import read_model
+from fish_sim.robot_file import read_model
 from fish_sim.way import way_from_rest
 
 SIMULATOR, CAMERA = SIMULATED

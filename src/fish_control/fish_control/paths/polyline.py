@@ -13,7 +13,7 @@ from fish_control.paths.points_file import read_points
 from fish_control.paths.rounded import round_corners
 from fish_control.paths.svg import read_svg
 from fish_control.reference_path import End, PathError, ReferencePath, require_positive
-from fish_node.packed_file import packed_as
+from fish_node.file_head import packed_as
 
 SUFFIXES = (".csv", ".svg")
 

@@ -17,7 +17,7 @@ from fish_hw.devices.reconnect import ERROR, OK, WARN, DeviceError, Link, Status
 from fish_hw.settings import CameraSettings
 from fish_hw.transport.interfaces import PortUnavailable
 from fish_hw.transport.video_capture import Frame
-from fish_node.picture_size import LARGEST_SIDE, jpeg_size
+from fish_node.file_head import LARGEST_SIDE, jpeg_size
 
 LIVE = ("/dev/", "unix:")  # devices with noise of their own; a file may hold equal pictures
 CLOSE_WAIT_S = 1.5  # longer than a camera keeps OpenCV waiting

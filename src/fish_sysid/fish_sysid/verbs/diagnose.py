@@ -12,8 +12,7 @@ from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_report.errors import UserError, user_errors
 from fish_report.files import named_path, writable_folder, write_json
 from fish_report.terminal import PARAGRAPH, cell, say, terminal
-from fish_sim.robot_argument import read_model
-from fish_sim.robot_file import save_robot
+from fish_sim.robot_file import read_model, save_robot
 from fish_sysid.dataset.read import line, read_days, read_experiment
 
 FILES = ("diagnosis.json", "model.yaml", "report.html")

@@ -17,7 +17,7 @@ from pathlib import Path
 from fish_report.errors import user_errors
 from fish_report.files import writable_file, write_json
 from fish_report.terminal import print_table, terminal
-from fish_sim.robot_argument import read_model
+from fish_sim.robot_file import read_model
 from fish_sysid.verbs.plan_calibration import add_sensor_arguments, sensor_set
 
 

@@ -17,7 +17,7 @@ from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_report.errors import user_errors
 from fish_report.files import writable_folder
 from fish_report.terminal import PARAGRAPH, plain, say, terminal
-from fish_sim.robot_argument import read_model
+from fish_sim.robot_file import read_model
 from fish_sysid.dataset.read import line, read_experiment
 
 FILES = ("robot.yaml", "identification.json", "report.html")

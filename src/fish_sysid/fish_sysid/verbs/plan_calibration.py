@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from fish_report.errors import UserError, user_errors
 from fish_report.files import writable_file
 from fish_report.terminal import print_table, terminal
-from fish_sim.robot_argument import read_model
+from fish_sim.robot_file import read_model
 
 if TYPE_CHECKING:
     from fish_sysid.design.sensitivity import SensorSet

@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     """Evaluate, print, write; 1 if a run failed."""
     from fish_report.errors import user_errors
     from fish_report.terminal import print_table
-    from fish_sim.robot_argument import read_model
+    from fish_sim.robot_file import read_model
     from fish_train.evaluation.candidates import constant_candidate, read_candidate
     from fish_train.evaluation.cells import make_cells, read_path
     from fish_train.evaluation.study import make_condition, robust_conditions, run_study

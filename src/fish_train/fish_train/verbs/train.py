@@ -24,7 +24,7 @@ from rich.console import Console
 from fish_report.errors import UserError
 from fish_report.robofish import words_after
 from fish_report.terminal import say, terminal
-from fish_sim.robot_argument import read_model
+from fish_sim.robot_file import read_model
 
 if TYPE_CHECKING:
     from fish_sim.robot import Robot

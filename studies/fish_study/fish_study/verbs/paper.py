@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Everything; 0 when the page is written."""
-    from fish_sim.robot_argument import read_model
+    from fish_sim.robot_file import read_model
     from fish_study.paper_page import (
         better_cells,
         error_table,

@@ -1,9 +1,18 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Width and height of a packed picture from its head: a few bytes may say a size that fills the memory when unpacked."""
+"""What the first bytes of a file or picture say: that it is another thing than its name says, or how large it unpacks.
+
+A few bytes may say a size that fills the memory when the picture is unpacked.
+"""
 
 from __future__ import annotations
 
+MAGICS = {
+    b"version https://git-lfs": "a Git LFS pointer; 'git lfs pull' brings the file",
+    b"\x1f\x8b": "compressed by gzip; gunzip it",
+    b"PK\3\4": "a zip archive; unzip it",
+    b"(\xb5/\xfd": "compressed by zstd; unzstd it",
+}  # first bytes -> what the file is, and what to do
 LARGEST_SIDE = 8192  # pixels; a larger picture is none of a camera over a pool
 PNG_START = b"\x89PNG\r\n\x1a\n"
 JPEG_START = b"\xff\xd8"
@@ -15,6 +24,11 @@ FRAMES = (
     0xCA,
 )  # markers of T.81 that begin a frame of a kind that is decoded
 SCAN = 0xDA  # the picture itself begins
+
+
+def packed_as(head: bytes) -> str:
+    """What a file is by its first bytes, and what to do; "" if it is none of MAGICS."""
+    return next((said for magic, said in MAGICS.items() if head.startswith(magic)), "")
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:
