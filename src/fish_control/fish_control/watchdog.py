@@ -90,14 +90,13 @@ class Watchdog:
         fault = estimate_fault(signs.estimate, config.odometry_timeout, config.largest_variance)
         if fault is not None:
             return fault
-        ages = {
-            "target": signs.target_age,
-            "control/twist": signs.twist_age,
-            "tracking/error": signs.error_age,
-        }
-        for name, age in ages.items():
+        for name, age, waiting in (
+            ("target", signs.target_age, "waiting for a target"),
+            ("control/twist", signs.twist_age, "waiting for control/twist"),
+            ("tracking/error", signs.error_age, "waiting for tracking/error"),
+        ):
             if age is None:
-                return "waiting for a target" if name == "target" else f"waiting for {name}"
+                return waiting
             if fault := _age_fault(name, age, config.target_timeout):
                 return fault
         return None

@@ -1098,7 +1098,11 @@ def test_a_second_node_of_the_same_kind_is_warned_of_on_diagnostics_and_console(
         ),
         (controller.main, "lokahead:=0.4", "unknown parameter lokahead (did you mean lookahead?)"),
         (fusion.main, "foo:=1", "unknown parameter foo; known: "),
-        (exciter.main, "use_sim_tme:=true", "unknown parameter use_sim_tme; known: begin, "),
+        (
+            exciter.main,
+            "use_sim_tme:=true",
+            "unknown parameter use_sim_tme; known: arming_required, begin, ",
+        ),
         (
             controller.main,
             "weights_file:=nowhere.safetensors",
