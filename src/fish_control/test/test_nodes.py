@@ -311,6 +311,7 @@ def test_fusion_survives_poses_that_are_none_and_says_why(bench, spoil, said, co
         b.say("camera/pose", message)
     b.until(lambda: b.said(b"\x02", said))
     b.until(lambda: b.node._fusion.counts[f"pose_{count}"] > 10)
+    assert b.node._fusion.counts["pose"] == 0
 
 
 def test_fusion_uses_nothing_that_a_message_calls_not_measured(bench):
