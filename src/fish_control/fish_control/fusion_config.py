@@ -7,8 +7,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-LARGEST_DISTANCE = 1e3  # m, along x or y from the pool's origin; a position beyond it is wrong
-
 
 @dataclass(frozen=True)
 class MotionNoise:

@@ -15,10 +15,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.fusion_config import LARGEST_DISTANCE, FusionConfig
+from fish_control.fusion_config import FusionConfig
 from fish_control.measurement_buffer import CameraPose
 from fish_control.offset_sums import ClockEstimate
 from fish_control.strapdown import NoiseScale, pose_residual
+from fish_node.pool import FARTHEST
 
 Array = NDArray[np.float64]
 
@@ -145,7 +146,7 @@ def unusable(stamp: float, camera: CameraPose, covariance: Array | None) -> str:
     R = camera.R
     if not (math.isfinite(stamp) and np.isfinite(camera.pose).all() and np.isfinite(R).all()):
         return "pose_not_finite"
-    if np.abs(camera.pose[:2]).max() > LARGEST_DISTANCE:
+    if np.abs(camera.pose[:2]).max() > FARTHEST:
         return "pose_implausible"
     tolerance = ROUNDING * float(np.abs(R).max())
     if np.abs(R - R.T).max() > tolerance or not _is_positive(R + tolerance * np.eye(3)):

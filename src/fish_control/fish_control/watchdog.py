@@ -8,13 +8,13 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from fish_control.fusion_config import LARGEST_DISTANCE
 from fish_control.line_of_sight import Motion
 from fish_control.node_configs import ControllerConfig
+from fish_node.pool import FARTHEST
 
 LARGEST_TWIST_VARIANCE = 1.0  # m^2/s^2, rad^2/s^2; fusion marks the twist without IMU with 1e4
 # m, rad, m/s, rad/s
-LARGEST_MOTION = Motion(LARGEST_DISTANCE, LARGEST_DISTANCE, math.pi, 5.0, 5.0, 50.0)
+LARGEST_MOTION = Motion(FARTHEST, FARTHEST, math.pi, 5.0, 5.0, 50.0)
 IMPLAUSIBLE = (
     f"odometry is not plausible: a value is not a number, or above {LARGEST_MOTION.x:g} m, {LARGEST_MOTION.surge:g} m/s or "
     f"{LARGEST_MOTION.yaw_rate:g} rad/s"

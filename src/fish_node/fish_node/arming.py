@@ -18,7 +18,11 @@ import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from fish_node.pool import FARTHEST
+
 LONGEST = 400  # characters
+FASTEST = 50.0  # m/s, rad/s
+LEAST_NORM = 0.5  # of an orientation's part about z
 
 
 def visible(text: str) -> str:
@@ -217,6 +221,17 @@ def largest_of(variances: Iterable[float]) -> float:
     """The largest variance; NaN if one is no number or below zero, which says that nobody measured it."""
     found = list(variances)
     return max(found) if all(value >= 0.0 for value in found) else math.nan
+
+
+def can_be_in_a_pool(x: float, y: float, qz: float, qw: float) -> bool:
+    """Whether a place [m] and the part of an orientation about z are numbers that a fish in a pool can have."""
+    near = abs(x) <= FARTHEST and abs(y) <= FARTHEST
+    return near and LEAST_NORM <= math.hypot(qz, qw) <= 1.0 / LEAST_NORM
+
+
+def can_be_swum(rates: Iterable[float]) -> bool:
+    """Whether velocities [m/s, rad/s] are numbers that a fish can have."""
+    return all(abs(rate) <= FASTEST for rate in rates)
 
 
 def estimate_trouble(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 
+FARTHEST = 1e3  # m, along x or y from the origin; a position beyond it is wrong in any pool
 MEASURED = "4.27x2.13"  # m, of the published robot's pool
 
 

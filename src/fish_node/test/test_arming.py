@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Quaternion
 from rclpy.serialization import deserialize_message, serialize_message
 
 from fish_node.arming import (
@@ -24,11 +23,13 @@ from fish_node.arming import (
     Arming,
     ArmingSettings,
     Source,
+    can_be_in_a_pool,
+    can_be_swum,
     estimate_trouble,
     largest_of,
     operator_and_estimate,
 )
-from fish_node.nodes.arming import FORGOTTEN_S, ArmingListener, ArmingServer, is_plausible
+from fish_node.nodes.arming import FORGOTTEN_S, ArmingListener, ArmingServer
 from fish_node.rivals import Rivals
 
 COMMAND = Source("joint_command", 0.15)
@@ -403,4 +404,10 @@ def test_an_owner_that_fell_silent_forbids_to_move_where_one_is_required():
     ],
 )
 def test_a_place_that_no_fish_can_have_is_no_estimate(x, w, plausible):
-    assert is_plausible(x, 0.0, Quaternion(z=0.0, w=w)) is plausible
+    assert can_be_in_a_pool(x, 0.0, 0.0, w) is plausible
+
+
+@pytest.mark.parametrize("rate", [51.0, -1e300, math.inf, math.nan])
+def test_a_speed_that_no_fish_can_have_is_no_estimate(rate):
+    assert can_be_swum((0.3, 0.0, -2.0))
+    assert not can_be_swum((0.3, rate, -2.0))

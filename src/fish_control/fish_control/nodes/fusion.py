@@ -19,7 +19,6 @@ from sensor_msgs.msg import Imu
 
 from fish_control.estimate import Estimate
 from fish_control.fusion import Fusion
-from fish_control.fusion_config import LARGEST_DISTANCE
 from fish_control.fusion_status import (
     clock_values,
     clock_warning,
@@ -45,6 +44,7 @@ from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.robot_clock import timer_clock
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
+from fish_node.pool import FARTHEST
 
 # why fusion does not use a pose, as it counts it -> the reason and what to change
 REFUSALS = {
@@ -61,7 +61,7 @@ REFUSALS = {
         "a tracker that sees no fish publishes no pose",
     ),
     "pose_implausible": (
-        f"its poses are more than {LARGEST_DISTANCE:g} m from the pool's origin along x or y",
+        f"its poses are more than {FARTHEST:g} m from the pool's origin along x or y",
         "set the tracker's unit to metres and its origin in the pool",
     ),
 }

@@ -15,7 +15,6 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
 from uuid import uuid4
 
 from builtin_interfaces.msg import Time
@@ -39,6 +38,8 @@ from fish_node.arming import (
     PAUSE,
     Arming,
     ArmingSettings,
+    can_be_in_a_pool,
+    can_be_swum,
     estimate_trouble,
     largest_of,
     visible,
@@ -62,8 +63,6 @@ FORGOTTEN_S = 1.0  # s; an owner says its state more often
 SILENT = f"no arming/state for {FORGOTTEN_S:g} s: the node rotor or simulator is gone"
 NEVER_HEARD = "no arming/state yet: the node rotor or simulator publishes it"
 ONE_TOO_MANY = "stop one of the two, or give it another domain"
-FARTHEST, FASTEST = 1e3, 50.0  # m; m/s and rad/s: more is no motion of a fish
-LEAST_NORM = 0.5  # of an orientation's part about z
 AFTER_STAMP = BODY + STAMP.size  # bytes of a message with a header
 
 
@@ -158,14 +157,15 @@ class ArmingServer:
         trouble = estimate_trouble(
             largest_of(pose.covariance[i] for i in PLANAR),
             largest_of(twist.covariance[i] for i in PLANAR),
-            is_plausible(position.x, position.y, q) and all(abs(v) <= FASTEST for v in moves),
+            can_be_in_a_pool(position.x, position.y, q.z, q.w) and can_be_swum(moves),
             self._settings.largest_variance,
         )
         self._arming.heard(ODOMETRY, self._clock(), trouble)
 
     def _on_camera(self, message: PoseWithCovarianceStamped) -> None:
         place = message.pose.pose
-        seen = is_plausible(place.position.x, place.position.y, place.orientation)
+        at, turned = place.position, place.orientation
+        seen = can_be_in_a_pool(at.x, at.y, turned.z, turned.w)
         if seen and self._is_new(CAMERA, message.header.stamp):
             self._arming.heard(CAMERA, self._clock())
 
@@ -203,15 +203,6 @@ class ArmingServer:
         """Whether a message is not the one before again: one that repeats a stamp says nothing new."""
         before, self._stamps[source] = self._stamps.get(source), stamp
         return bool(stamp != before)
-
-
-def is_plausible(x: float, y: float, orientation: Any) -> bool:
-    """Whether a place [m] and an orientation are numbers that a fish in a pool can have."""
-    return (
-        abs(x) <= FARTHEST
-        and abs(y) <= FARTHEST
-        and LEAST_NORM <= math.hypot(orientation.z, orientation.w) <= 1.0 / LEAST_NORM
-    )
 
 
 def state_of(data: bytes, node: Node) -> DiagnosticArray:
